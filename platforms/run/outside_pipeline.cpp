@@ -159,7 +159,7 @@ bool draws_with(const Variant& variant, const std::string& slot) {
 }
 
 void check_drawable(const RunRequest& request, const Frame& frame) {
-  if (request.variant.drawn_by == DrawnBy::pipeline) return;
+  if (request.variant.is_of_pipeline()) return;
   check_is_of_splats(frame, ("cannot draw by variant '" + request.variant.name + "'").c_str());
 }
 

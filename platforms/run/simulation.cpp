@@ -506,8 +506,6 @@ void run_untimed(const Configuration& configuration, std::atomic<float>* progres
   for (const std::string& reason : others->unknown()) result.outside_validated_range.push_back(reason);
 }
 
-bool is_outside(const RunRequest& request) { return request.variant.drawn_by != DrawnBy::pipeline; }
-
 RunResult simulate_pipeline(const RunRequest& request, const Frame& frame, std::atomic<float>* progress) {
   check_sampling_has_time(request);
   check_may_stop(request);
@@ -540,8 +538,8 @@ RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<floa
 }
 
 RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<float>* progress) {
-  RunResult result =
-      is_outside(request) ? simulate_outside_pipeline(request, frame) : simulate_pipeline(request, frame, progress);
+  RunResult result = request.variant.is_of_pipeline() ? simulate_pipeline(request, frame, progress)
+                                                      : simulate_outside_pipeline(request, frame);
   if (!result.stopped) check_conservation(result.counts);
   if (request.observers != nullptr) request.observers->end(result);
   return result;
@@ -577,7 +575,7 @@ void check_configuration(const RunRequest& request) {
   check_sampling_has_time(request);
   check_may_stop(request);
   RunRequest of_pipeline = with_all_effects(request);
-  if (is_outside(request)) {
+  if (!request.variant.is_of_pipeline()) {
     check_outside_pipeline(request);
     of_pipeline = of_pipeline_alone(std::move(of_pipeline));
     of_pipeline.observers = nullptr;
@@ -590,7 +588,7 @@ void check_configuration(const RunRequest& request) {
 
 std::vector<std::string> sampled_statistics(const RunRequest& request) {
   std::vector<std::string> names;
-  if (!has_time(request.fidelity) || is_outside(request)) return names;
+  if (!has_time(request.fidelity) || !request.variant.is_of_pipeline()) return names;
   const Frame empty(1, 1);
   const Configuration configuration(with_all_effects(request), empty);
   with_sampler(configuration, [&](const StatisticSampler& sampler) { names = sampler.names(); });
@@ -598,7 +596,7 @@ std::vector<std::string> sampled_statistics(const RunRequest& request) {
 }
 
 std::vector<std::string> counted_statistics(const RunRequest& request) {
-  return is_outside(request) ? statistics_outside_pipeline(request) : sampled_statistics(request);
+  return request.variant.is_of_pipeline() ? sampled_statistics(request) : statistics_outside_pipeline(request);
 }
 
 std::vector<ParameterListing> list_parameters(const Platform* platform) {

@@ -13,6 +13,12 @@
 
 namespace vrpipe {
 
+const StatisticReport* statistic_named(const std::vector<StatisticReport>& statistics, const std::string& name) {
+  const auto found = std::find_if(statistics.begin(), statistics.end(),
+                                  [&](const StatisticReport& statistic) { return statistic.name == name; });
+  return found == statistics.end() ? nullptr : &*found;
+}
+
 StatisticCollector::Gathered& StatisticCollector::gathered(const StatisticReport& declared, const std::string& kind,
                                                            const std::optional<Histogram::Buckets>& buckets) {
   // Two implementations in instances of a kind may mean different things by a name; they are not added up.

@@ -34,7 +34,7 @@ void print_hashes() {
   }
   for (const Fidelity fidelity : {Fidelity::functional, Fidelity::lt, Fidelity::cycle}) {
     for (const Variant& variant : more_variants()) {
-      if (variant.drawn_by != DrawnBy::pipeline) continue;  // below, with each of their units
+      if (!variant.is_of_pipeline()) continue;  // below, with each of their units
       RunRequest request;
       request.platform = &platforms().front();
       request.variant = variant;

@@ -43,7 +43,7 @@ std::string names_of(const std::vector<Fidelity>& fidelities) {
 }
 
 /// Whether it draws with kernels, or by an accelerator.
-bool is_outside(const Variant& variant) { return variant.drawn_by != DrawnBy::pipeline; }
+bool is_outside(const Variant& variant) { return !variant.is_of_pipeline(); }
 
 /// What is for kernels and accelerators, where no variant draws with these.
 void refuse_unused(const RunRequest& request, const std::vector<Variant>& variants) {

@@ -147,7 +147,7 @@ void TimeArguments::observe(SimulationJob& job) const {
   } else if (job.html && has_course(job.requests.front()) && !job.explain_effects) {
     job.intervals_for_page = true;
     for (RunRequest& request : job.requests) {
-      if (request.variant.drawn_by == DrawnBy::pipeline) record_intervals(observers_of(request), page_interval, {});
+      if (request.variant.is_of_pipeline()) record_intervals(observers_of(request), page_interval, {});
     }
   }
   RunRequest& request = job.requests.front();

@@ -178,7 +178,7 @@ void compare_rungs(FidelityLevel* levels, std::size_t count) {
 }
 
 bool is_finest(const RunRequest& request) { return request.fidelity == finest_fidelity(request.variant); }
-bool is_of_pipeline(const RunRequest& request) { return request.variant.drawn_by == DrawnBy::pipeline; }
+bool is_of_pipeline(const RunRequest& request) { return request.variant.is_of_pipeline(); }
 
 /// The runs of the fidelity ladder: for each variant from the most exact fidelity on, so that its image is there to
 /// compare with.
@@ -305,7 +305,7 @@ std::vector<PrecisionSettings> choose_values(const AccuracyJob& job, bool is_dra
       result.knobs_left_out.push_back(knob.name);
       continue;
     }
-    if (knob.is_of_pipeline && !is_of_pipeline(result.base)) {
+    if (knob.is_of_pipeline && !result.base.variant.is_of_pipeline()) {
       result.knobs_without_pipeline.push_back(knob.name);
       continue;
     }
@@ -343,9 +343,8 @@ void climb_precisions(const AccuracyJob& job, const Workload& workload, const st
     run.run = std::move(simulated.result);
     const ShownImage image = shown(*simulated.image, job.simulation.background);
     run.error = image_error(image, reference);
-    for (const StatisticReport& statistic : run.run.statistics) {
-      if (statistic.name == "crop.pixels_stuck") run.pixels_stuck = statistic.value;
-    }
+    if (const StatisticReport* const stuck = statistic_named(run.run.statistics, "crop.pixels_stuck"))
+      run.pixels_stuck = stuck->value;
     if (job.html) {
       run.picture = picture_of(image, picture_width);
       run.error_map = error_map(image, reference, picture_width);

@@ -11,8 +11,7 @@ namespace vrpipe::tools {
 std::optional<double> speedup(const RunResult& baseline, const RunResult& run) {
   if (!baseline.cycles || !run.cycles || *run.cycles == 0) return std::nullopt;
   // What is drawn outside the pipeline may not count fragments.
-  const bool is_of_pipeline = baseline.request.variant.drawn_by == DrawnBy::pipeline;
-  if (is_of_pipeline && baseline.counts.fragments_rasterized == 0) return std::nullopt;
+  if (baseline.request.variant.is_of_pipeline() && baseline.counts.fragments_rasterized == 0) return std::nullopt;
   const double ratio = static_cast<double>(*baseline.cycles) / static_cast<double>(*run.cycles);
   if (baseline.request.platform == run.request.platform) return ratio;
   const double from = baseline.request.platform->frequency_mhz;
@@ -25,7 +24,7 @@ std::optional<double> early_termination_ratio(const std::vector<RunResult>& runs
   const RunResult* with = nullptr;
   for (const RunResult& run : runs) {
     const Variant& variant = run.request.variant;
-    if (variant.drawn_by != DrawnBy::pipeline || variant.quad_merging || !variant.base.empty()) continue;
+    if (!variant.is_of_pipeline() || variant.quad_merging || !variant.base.empty()) continue;
     if (run.request.platform != runs.front().request.platform) continue;
     const RunResult*& found = variant.early_termination ? with : without;
     if (found == nullptr) found = &run;

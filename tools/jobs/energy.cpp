@@ -154,6 +154,17 @@ EnergyAmounts amounts_of(const EnergyNumbers& numbers, const Platform& platform,
   return amounts;
 }
 
+/// Of an accelerator; none where none is published.
+std::optional<double> published_watts(const std::vector<std::pair<std::string, std::string>>& parameters) {
+  for (const auto& [name, text] : parameters) {
+    double watts = 0;
+    if (name != "accelerator.power_watts") continue;
+    std::from_chars(text.data(), text.data() + text.size(), watts);
+    if (watts > 0) return watts;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 EnergyAmounts& EnergyAmounts::operator+=(const EnergyAmounts& next) {
@@ -167,7 +178,7 @@ EnergyAmounts& EnergyAmounts::operator+=(const EnergyAmounts& next) {
   } else {
     seconds.reset();
   }
-  own_joules += next.own_joules;
+  own_millijoules += next.own_millijoules;
   is_known = is_known && next.is_known;
   fragments_blended += next.fragments_blended;
   const auto add = [](std::vector<std::string>& names, const std::vector<std::string>& others) {
@@ -180,34 +191,12 @@ EnergyAmounts& EnergyAmounts::operator+=(const EnergyAmounts& next) {
   return *this;
 }
 
-namespace {
-/// Of kernels one after the other.
-EnergyAmounts amounts_of_kernels(const RunResult& run, const EnergyTable& table) {
-  EnergyAmounts amounts = energy_amounts(run.kernels.front(), run, table);
-  for (std::size_t i = 1; i < run.kernels.size(); ++i) amounts += energy_amounts(run.kernels[i], run, table);
-  return amounts;
-}
-
-EnergyAmounts amounts_of_accelerator(const RunResult& run, const EnergyTable& table) {
-  std::uint64_t bytes = 0;
-  for (const KernelReport& stage : run.kernels) bytes += stage.bytes;
-  EnergyAmounts amounts = energy_amounts_of_dram(bytes, table);
-  const std::optional<double> watts = published_watts(run.parameters);
-  amounts.is_known = watts && run.cycles;
-  if (!amounts.is_known) {
-    amounts.missing.push_back("power of the accelerator");
-    return amounts;
-  }
-  amounts.seconds = run.milliseconds * 1e-3;
-  amounts.own_joules = *watts * *amounts.seconds;
-  return amounts;
-}
-}  // namespace
-
 EnergyAmounts energy_amounts(const RunResult& run, const EnergyTable& table) {
-  if (run.request.variant.drawn_by != DrawnBy::pipeline) {
-    EnergyAmounts amounts = run.request.variant.drawn_by == DrawnBy::software ? amounts_of_kernels(run, table)
-                                                                              : amounts_of_accelerator(run, table);
+  if (!run.request.variant.is_of_pipeline()) {
+    const std::optional<double> milliseconds = run.cycles ? std::optional(run.milliseconds) : std::nullopt;
+    EnergyAmounts amounts = run.request.variant.drawn_by == DrawnBy::software
+                                ? energy_amounts(run.kernels, run, table)
+                                : accelerator_amounts(run.kernels, run.parameters, milliseconds, table);
     amounts.fragments_blended = run.counts.fragments_blended;
     return amounts;
   }
@@ -230,6 +219,13 @@ EnergyAmounts energy_amounts(const KernelReport& kernel, const RunResult& machin
   return amounts;
 }
 
+EnergyAmounts energy_amounts(const std::vector<KernelReport>& kernels, const RunResult& machine,
+                             const EnergyTable& table) {
+  EnergyAmounts amounts = energy_amounts(kernels.front(), machine, table);
+  for (std::size_t i = 1; i < kernels.size(); ++i) amounts += energy_amounts(kernels[i], machine, table);
+  return amounts;
+}
+
 EnergyAmounts energy_amounts_of_dram(std::uint64_t bytes, const EnergyTable& table) {
   EnergyNumbers numbers;
   numbers.add("kernel.dram_bytes", static_cast<double>(bytes));
@@ -238,6 +234,23 @@ EnergyAmounts energy_amounts_of_dram(std::uint64_t bytes, const EnergyTable& tab
   for (const EnergyEvent& event : table.events)
     amounts.events.push_back(numbers.value(event.count, missing).value_or(0));
   amounts.powers.assign(table.powers.size(), 0);
+  return amounts;
+}
+
+EnergyAmounts accelerator_amounts(const std::vector<KernelReport>& stages,
+                                  const std::vector<std::pair<std::string, std::string>>& parameters,
+                                  const std::optional<double>& milliseconds, const EnergyTable& table) {
+  std::uint64_t bytes = 0;
+  for (const KernelReport& stage : stages) bytes += stage.bytes;
+  EnergyAmounts amounts = energy_amounts_of_dram(bytes, table);
+  const std::optional<double> watts = published_watts(parameters);
+  amounts.is_known = watts && milliseconds;
+  if (!amounts.is_known) {
+    amounts.missing.push_back("power of the accelerator");
+    return amounts;
+  }
+  amounts.seconds = *milliseconds * 1e-3;
+  amounts.own_millijoules = *watts * *milliseconds;
   return amounts;
 }
 
@@ -254,7 +267,7 @@ EnergyReport energy_report(const EnergyAmounts& amounts, const EnergyTable& tabl
     (event.unit == "TGC" || event.unit == "QRU" ? merging : others) += spent;
   }
   for (const UnitEnergy& unit : report.units) report.moving += unit.millijoules;
-  const double own = amounts.own_joules * 1e3;
+  const double own = amounts.own_millijoules;
   report.moving += {own, own, own};
   others += {own, own, own};
   if (!amounts.seconds) return report;
@@ -288,7 +301,7 @@ std::optional<Range> energy_ratio(const EnergyAmounts& baseline, const EnergyAmo
     const double before = baseline.powers[i] * *baseline.seconds, after = run.powers[i] * *run.seconds;
     terms.push_back({before, after, table.powers[i].watts});
   }
-  terms.push_back({baseline.own_joules, run.own_joules, {1, 1, 1}});
+  terms.push_back({baseline.own_millijoules * 1e-3, run.own_millijoules * 1e-3, {1, 1, 1}});
   // Its quotient would be no number.
   const auto is_nothing = [](const Term& term) { return term.baseline == 0 && term.run == 0; };
   terms.erase(std::remove_if(terms.begin(), terms.end(), is_nothing), terms.end());
@@ -296,16 +309,6 @@ std::optional<Range> energy_ratio(const EnergyAmounts& baseline, const EnergyAmo
     if (!(total(terms, amount, &Range::low) > 0)) return std::nullopt;
   }
   return range_of_ratio(std::move(terms));
-}
-
-std::optional<double> published_watts(const std::vector<std::pair<std::string, std::string>>& parameters) {
-  for (const auto& [name, text] : parameters) {
-    double watts = 0;
-    if (name != "accelerator.power_watts") continue;
-    std::from_chars(text.data(), text.data() + text.size(), watts);
-    if (watts > 0) return watts;
-  }
-  return std::nullopt;
 }
 
 std::vector<std::string> powers_of_other_platforms(const EnergyTable& table, const Platform& platform) {

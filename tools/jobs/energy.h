@@ -19,7 +19,7 @@ struct EnergyAmounts {
   std::vector<double> events;     ///< how often, by EnergyTable::events
   std::vector<double> powers;     ///< how many, in the mean over the time, by EnergyTable::powers
   std::optional<double> seconds;  ///< simulated; none where the fidelity has no time
-  double own_joules = 0;          ///< of an accelerator, by its published power, beside all of the table
+  double own_millijoules = 0;     ///< of an accelerator, by its published power, beside all of the table
   bool is_known = true;           ///< false: nobody knows what was spent
   std::uint64_t fragments_blended = 0;
   std::vector<std::string> not_counted;  ///< "UNIT: NAME" of events and powers of which the run has no counter
@@ -38,8 +38,18 @@ EnergyAmounts energy_amounts(const RunResult& run, const EnergyTable& table);
 /// Of a kernel of a frame, on the platform of a run: what there is of it is the run's.
 EnergyAmounts energy_amounts(const KernelReport& kernel, const RunResult& machine, const EnergyTable& table);
 
+/// Of kernels one after the other, of which there are some.
+EnergyAmounts energy_amounts(const std::vector<KernelReport>& kernels, const RunResult& machine,
+                             const EnergyTable& table);
+
 /// Of so many bytes to and from a DRAM, of whomever; no time.
 EnergyAmounts energy_amounts_of_dram(std::uint64_t bytes, const EnergyTable& table);
+
+/// Of an accelerator: its published power over its time, and what its stages move to and from its DRAM.
+/// @param parameters  its own, among them that power
+EnergyAmounts accelerator_amounts(const std::vector<KernelReport>& stages,
+                                  const std::vector<std::pair<std::string, std::string>>& parameters,
+                                  const std::optional<double>& milliseconds, const EnergyTable& table);
 
 struct UnitEnergy {
   std::string unit;
@@ -64,9 +74,6 @@ EnergyReport energy_report(const EnergyAmounts& amounts, const EnergyTable& tabl
 /// and high are the extremes over all that they may be. None where either misses something, or they are made in two
 /// processes.
 std::optional<Range> energy_ratio(const EnergyAmounts& baseline, const EnergyAmounts& run, const EnergyTable& table);
-
-/// Watts of an accelerator as published, by its parameters; none where they are not known, or it is of another kind.
-std::optional<double> published_watts(const std::vector<std::pair<std::string, std::string>>& parameters);
 
 /// Powers that the platform takes, though the table says that they were found for others.
 std::vector<std::string> powers_of_other_platforms(const EnergyTable& table, const Platform& platform);

@@ -35,13 +35,10 @@ FrameEnergy FrameEnergies::of_parts(const std::optional<EnergyAmounts>& preproce
 FrameEnergy FrameEnergies::of_software(const SoftwareResult& result) const {
   std::optional<EnergyAmounts> preprocess;
   if (result.preprocess) preprocess = of_kernel(*result.preprocess);
-  EnergyAmounts sort = of_kernel(result.binning.front());
-  for (std::size_t i = 1; i < result.binning.size(); ++i) sort += of_kernel(result.binning[i]);
   EnergyAmounts raster = of_kernel(result.render);
-  for (const StatisticReport& statistic : result.statistics) {
-    if (statistic.name == "render.lanes_blending") raster.fragments_blended = statistic.value;
-  }
-  return of_parts(preprocess, sort, raster);
+  if (const StatisticReport* const blended = statistic_named(result.statistics, "render.lanes_blending"))
+    raster.fragments_blended = blended->value;
+  return of_parts(preprocess, energy_amounts(result.binning, machine_, table_), raster);
 }
 
 FrameEnergy FrameEnergies::of_draw(const RunResult& draw, const HardwarePreparation& prepared) const {
@@ -52,14 +49,13 @@ FrameEnergy FrameEnergies::of_draw(const RunResult& draw, const HardwarePreparat
 
 FrameEnergy FrameEnergies::of_accelerator(const AcceleratorResult& result) const {
   FrameEnergy energy;
-  const std::optional<double> watts = published_watts(result.parameters);
-  if (!watts || !result.cycles) return energy;
-  std::uint64_t bytes = result.sort.bytes + result.raster.bytes;
-  if (result.preprocess) bytes += result.preprocess->bytes;
-  Range frame = energy_report(energy_amounts_of_dram(bytes, table_), table_).moving;
-  const double milliseconds = static_cast<double>(*result.cycles) / (result.frequency_mhz * 1e3);
-  const double of_units = *watts * milliseconds;
-  frame += {of_units, of_units, of_units};
+  std::vector<KernelReport> stages{result.sort, result.raster};
+  if (result.preprocess) stages.push_back(*result.preprocess);
+  std::optional<double> milliseconds;
+  if (result.cycles) milliseconds = static_cast<double>(*result.cycles) / (result.frequency_mhz * 1e3);
+  const EnergyAmounts amounts = accelerator_amounts(stages, result.parameters, milliseconds, table_);
+  if (!amounts.is_known) return energy;
+  const Range frame = *energy_report(amounts, table_).total;
   energy.frame = frame;
   if (const std::optional<Range>& over = hardware_.frame; over && over->low > 0) {
     energy.over_hardware = Range{frame.low / over->high, frame.nominal / over->nominal, frame.high / over->low};

@@ -78,26 +78,16 @@ std::optional<ImageFiles> write_image(const SimulationJob& job, const std::strin
 
 class PathMaker {
  public:
-  explicit PathMaker(double frequency_mhz) : cycles_per_ms_(frequency_mhz * 1000) {}
+  explicit PathMaker(double frequency_mhz) : frequency_mhz_(frequency_mhz) {}
 
   FramePath of_software(const SoftwareResult& result) const {
     FramePath path = begin("software", result.implementations.back().second, result.request.fidelity);
     std::vector<Part> parts;
     std::vector<std::optional<double>> sorting;
-    const auto add = [&](const KernelReport& kernel) {
-      parts.push_back({kernel.name, milliseconds(kernel), kernel.bound_by});
-      path.bytes.emplace_back(kernel.name, kernel.bytes);
-      path.kernels.push_back(kernel);
-    };
-    if (result.preprocess) add(*result.preprocess);
-    for (const KernelReport& kernel : result.binning) {
-      add(kernel);
-      sorting.push_back(milliseconds(kernel));
-    }
-    add(result.render);
-    if (result.preprocess) path.preprocess = milliseconds(*result.preprocess);
+    if (result.preprocess) path.preprocess = add(*result.preprocess, path, parts);
+    for (const KernelReport& kernel : result.binning) sorting.push_back(add(kernel, path, parts));
     path.sort = sum(sorting);
-    path.raster = milliseconds(result.render);
+    path.raster = add(result.render, path, parts);
     path.frame = sum({path.preprocess, path.sort, path.raster});
     if (path.frame) path.interval = longest_of_shared(path, 0, 0);
     path.bound_by = longest(parts);
@@ -115,15 +105,8 @@ class PathMaker {
   FramePath of_hardware(const HardwareDraw& draw, const RunResult& run, const HardwarePreparation& prepared) const {
     FramePath path = begin(draw.path, draw.name, run.request.fidelity);
     std::vector<Part> parts;
-    const auto add = [&](const KernelReport& kernel) {
-      parts.push_back({kernel.name, milliseconds(kernel), kernel.bound_by});
-      path.bytes.emplace_back(kernel.name, kernel.bytes);
-      path.kernels.push_back(kernel);
-    };
-    if (prepared.preprocess) add(*prepared.preprocess);
-    add(prepared.sort);
-    if (prepared.preprocess) path.preprocess = milliseconds(*prepared.preprocess);
-    path.sort = milliseconds(prepared.sort);
+    if (prepared.preprocess) path.preprocess = add(*prepared.preprocess, path, parts);
+    path.sort = add(prepared.sort, path, parts);
     if (run.cycles) path.raster = run.milliseconds;
     path.frame = sum({path.preprocess, path.sort, path.raster});
     if (run.request.platform->name == measured_platform && run.request.fidelity >= Fidelity::lt &&
@@ -148,19 +131,14 @@ class PathMaker {
   static FramePath of_accelerator(const AcceleratorResult& result) {
     const PathMaker of_its_clock(result.frequency_mhz);
     FramePath path = begin("accelerator", result.name, result.request.fidelity);
-    const auto add = [&](const KernelReport& stage) {
-      path.bytes.emplace_back(stage.name, stage.bytes);
-      path.kernels.push_back(stage);
-      return of_its_clock.milliseconds(stage);
-    };
-    if (result.preprocess) path.preprocess = add(*result.preprocess);
-    path.sort = add(result.sort);
-    path.raster = add(result.raster);
-    if (result.cycles) path.frame = static_cast<double>(*result.cycles) / of_its_clock.cycles_per_ms_;
+    std::vector<Part> stages;
+    if (result.preprocess) path.preprocess = of_its_clock.add(*result.preprocess, path, stages);
+    path.sort = of_its_clock.add(result.sort, path, stages);
+    path.raster = of_its_clock.add(result.raster, path, stages);
+    if (result.cycles) path.frame = milliseconds_of(*result.cycles, result.frequency_mhz);
     if (result.name == "gscore" && result.request.fidelity == Fidelity::lt && is_as_shipped(result.request))
       path.expected_error_percent = accelerator_error_percent;
-    if (result.interval_cycles)
-      path.interval = static_cast<double>(*result.interval_cycles) / of_its_clock.cycles_per_ms_;
+    if (result.interval_cycles) path.interval = milliseconds_of(*result.interval_cycles, result.frequency_mhz);
     path.bound_by = result.bound_by;
     add_counters(result.statistics, path);
     path.implementations = {{"accelerator", result.name}};
@@ -184,8 +162,14 @@ class PathMaker {
         path.counts.emplace_back(statistic.name.substr(statistic.name.find('.') + 1), statistic.value);
     }
   }
-  std::optional<double> milliseconds(const KernelReport& kernel) const {
-    return kernel.cycles ? std::optional(static_cast<double>(*kernel.cycles) / cycles_per_ms_) : std::nullopt;
+  /// Its milliseconds.
+  std::optional<double> add(const KernelReport& kernel, FramePath& path, std::vector<Part>& parts) const {
+    std::optional<double> milliseconds;
+    if (kernel.cycles) milliseconds = milliseconds_of(*kernel.cycles, frequency_mhz_);
+    parts.push_back({kernel.name, milliseconds, kernel.bound_by});
+    path.bytes.emplace_back(kernel.name, kernel.bytes);
+    path.kernels.push_back(kernel);
+    return milliseconds;
   }
   static double utilization_of(const RunResult& run, const char* slot) {
     for (const auto& [name, share] : run.utilization) {
@@ -197,8 +181,8 @@ class PathMaker {
   double longest_of_shared(const FramePath& path, double sm_of_draw, double memory_of_draw) const {
     double sm = sm_of_draw, memory = memory_of_draw;
     for (const KernelReport& kernel : path.kernels) {
-      sm += static_cast<double>(kernel.sm_cycles) / cycles_per_ms_;
-      memory += static_cast<double>(kernel.memory_cycles) / cycles_per_ms_;
+      sm += milliseconds_of(kernel.sm_cycles, frequency_mhz_);
+      memory += milliseconds_of(kernel.memory_cycles, frequency_mhz_);
     }
     return std::max(sm, memory);
   }
@@ -213,7 +197,7 @@ class PathMaker {
     if (bytes) path.bytes.emplace_back("draw", *bytes);
   }
 
-  double cycles_per_ms_;
+  double frequency_mhz_;
 };
 
 /// The draws by hardware of a job.
@@ -361,6 +345,21 @@ std::optional<Distribution> over_views(const FrameViewsResult& result,
 }
 
 }  // namespace
+
+std::optional<std::uint64_t> FramePath::count(const std::string& of) const {
+  const auto found = std::find_if(counts.begin(), counts.end(), [&](const auto& each) { return each.first == of; });
+  return found == counts.end() ? std::nullopt : std::optional(found->second);
+}
+
+double milliseconds_of(std::uint64_t cycles, double frequency_mhz) {
+  return static_cast<double>(cycles) / (frequency_mhz * 1000);
+}
+
+FramePath software_path(const SoftwareResult& result) {
+  return PathMaker(result.request.platform->frequency_mhz).of_software(result);
+}
+
+FramePath accelerator_path(const AcceleratorResult& result) { return PathMaker::of_accelerator(result); }
 
 FramesResult perform_frames(const SimulationJob& job) {
   check_outputs(job, path_images(job, ""));

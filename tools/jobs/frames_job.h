@@ -41,7 +41,16 @@ struct FramePath {
   std::string result_hash;
   std::optional<ImageFiles> images;  ///< none where they could not be written, or were not asked for
   double host_seconds = 0;
+
+  std::string label() const { return path + " (" + name + ")"; }
+  /// None where nothing is counted by this name.
+  std::optional<std::uint64_t> count(const std::string& of) const;
 };
+
+double milliseconds_of(std::uint64_t cycles, double frequency_mhz);
+/// Of a frame in software, and by an accelerator; without energy and images.
+FramePath software_path(const SoftwareResult& result);
+FramePath accelerator_path(const AcceleratorResult& result);
 
 /// Of the path `imitation` (Imitation).
 struct ImitationReport {

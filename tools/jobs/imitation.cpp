@@ -83,11 +83,8 @@ Imitation imitation_of(const RunRequest& baseline, std::shared_ptr<const Draw> s
   imitation.frame = frame;
 
   const RunResult merged = simulate(counting(baseline, "het+qm"), *terminated);
-  std::uint64_t pairs = 0;
-  for (const StatisticReport& statistic : merged.statistics) {
-    if (statistic.name == "qru.pairs") pairs = statistic.value;
-  }
-  imitation.paired_quads = share(2 * pairs, merged.counts.quads_shaded);
+  const StatisticReport* const pairs = statistic_named(merged.statistics, "qru.pairs");
+  imitation.paired_quads = share(pairs != nullptr ? 2 * pairs->value : 0, merged.counts.quads_shaded);
   imitation.discarded_quads =
       share(merged.counts.quads_merged, merged.counts.quads_shaded - merged.counts.quads_pruned);
   imitation.request = baseline;

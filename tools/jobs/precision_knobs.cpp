@@ -59,7 +59,7 @@ PrecisionKnob variant_knob(const std::string& name, const std::string& meaning, 
     Variant wanted = settings.request.variant;
     wanted.*member = value == "on";
     for (const Variant& variant : variants()) {
-      if (variant.drawn_by == DrawnBy::pipeline && variant.quad_merging == wanted.quad_merging &&
+      if (variant.is_of_pipeline() && variant.quad_merging == wanted.quad_merging &&
           variant.early_termination == wanted.early_termination) {
         settings.request.variant = variant;
       }

@@ -283,6 +283,19 @@ Mean mean_of(const std::vector<double>& values) {
           distribution_of(there)->geometric_mean};
 }
 
+FrameTimes frame_times(const SceneFinding& scene, WholeFrame::Preparation WholeFrame::*by) {
+  FrameTimes times;
+  if (scene.frame == nullptr || !scene.runs[0]->run.cycles) return times;
+  const WholeFrame::Preparation& prepared = scene.frame->*by;
+  times.draw = scene.runs[0]->run.milliseconds;
+  times.software = scene.frame->software(prepared);
+  times.hardware = prepared.hardware() + times.draw;
+  times.het_qm = prepared.hardware() + scene.runs[3]->run.milliseconds;
+  times.before_render = times.software - scene.frame->render;
+  times.before_draw = prepared.hardware();
+  return times;
+}
+
 const TrialFinding* Findings::trial(const std::string& settings) const {
   const auto at =
       std::find_if(trials.begin(), trials.end(), [&](const auto& each) { return each.settings == settings; });

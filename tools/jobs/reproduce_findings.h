@@ -49,6 +49,16 @@ struct SceneFinding {
   const WholeFrame* frame = nullptr;  ///< null where there is none
 };
 
+/// Milliseconds of a scene's whole frames; NaN where they are unknown.
+struct FrameTimes {
+  double software = std::numeric_limits<double>::quiet_NaN();
+  double hardware = software, het_qm = software;  ///< the baseline's draw, and HET+QM's, with what comes before
+  double before_render = software, before_draw = software;  ///< what comes first, lists included
+  double draw = software;                                   ///< the baseline's
+};
+/// @param by  what is done before the draw: `measured` or `papers`
+FrameTimes frame_times(const SceneFinding& scene, WholeFrame::Preparation WholeFrame::*by);
+
 /// Mean gains at a setting.
 struct StudyPoint {
   std::string settings;  ///< empty: the default

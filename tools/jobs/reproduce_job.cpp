@@ -265,10 +265,11 @@ void simulate_points(const ReproduceJob& job, const std::vector<bool>& is_done, 
     point.run.request = plan.points[i].request;
     if (plan.points[i].key.settings.empty() && point.run.cycles)
       point.energy = energy_amounts(point.run, shipped_energies());
-    for (const StatisticReport& statistic : point.run.statistics) {
-      if (statistic.name == "sm.fragments_of_back_quads") point.fragments_of_back_quads = statistic.value;
-      if (statistic.name == "crop.fragments_blended_late") point.fragments_blended_late = statistic.value;
-    }
+    const auto take = [&](const char* name, std::uint64_t& value) {
+      if (const StatisticReport* const found = statistic_named(point.run.statistics, name)) value = found->value;
+    };
+    take("sm.fragments_of_back_quads", point.fragments_of_back_quads);
+    take("crop.fragments_blended_late", point.fragments_blended_late);
     result.cpu_seconds += point.run.cpu_seconds;
     strip_point(point.run, i == 0);
     tasks[task].request.observers.reset();

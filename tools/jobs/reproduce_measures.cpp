@@ -33,30 +33,8 @@ bool is_bound_by_rop(const SceneFinding& scene) {
          (bottleneck->unit.find("crop") != std::string::npos || bottleneck->unit.find("prop") != std::string::npos);
 }
 
-/// Of a whole frame, by what is done before the draw.
-enum class Preparation : std::uint8_t { measured, papers };
-
-/// Milliseconds; NaN where they are unknown.
-struct FrameTimes {
-  double software = no_number, hardware = no_number, het_qm = no_number;
-  double before_lists = no_number, before_draw = no_number;  ///< of which come first, lists included
-  double draw = no_number;                                   ///< the baseline's
-
-  FrameTimes(const SceneFinding& scene, Preparation by) {
-    if (scene.frame == nullptr || !scene.runs[0]->run.cycles) return;
-    const WholeFrame& frame = *scene.frame;
-    const WholeFrame::Preparation& prepared = by == Preparation::measured ? frame.measured : frame.papers;
-    draw = scene.runs[0]->run.milliseconds;
-    software = frame.software(prepared);
-    hardware = prepared.hardware() + draw;
-    het_qm = prepared.hardware() + scene.runs[3]->run.milliseconds;
-    before_lists = software - frame.render;
-    before_draw = prepared.hardware();
-  }
-};
-
-FrameTimes measured(const SceneFinding& scene) { return {scene, Preparation::measured}; }
-FrameTimes papers(const SceneFinding& scene) { return {scene, Preparation::papers}; }
+FrameTimes measured(const SceneFinding& scene) { return frame_times(scene, &WholeFrame::measured); }
+FrameTimes papers(const SceneFinding& scene) { return frame_times(scene, &WholeFrame::papers); }
 double frames_a_second(double milliseconds) { return 1e3 / milliseconds; }
 
 double of_frame(const SceneFinding& scene, double (*of)(const WholeFrame&)) {
@@ -135,13 +113,11 @@ const std::vector<Quantity>& quantities() {
       {"milliseconds of a frame by het+qm", [](Of of) { return measured(of).het_qm; }, false},
       {"milliseconds of a frame by GSCore",
        [](Of of) { return of_frame(of, [](const WholeFrame& frame) { return frame.accelerator; }); }, false},
-      {"milliseconds before rendering in software", [](Of of) { return measured(of).before_lists; }, false},
+      {"milliseconds before rendering in software", [](Of of) { return measured(of).before_render; }, false},
       {"milliseconds before the draw by hardware", [](Of of) { return measured(of).before_draw; }, false},
       {"percent of lanes that blend in software",
        [](Of of) {
-         return of_frame(of, [](const WholeFrame& frame) {
-           return 100 * static_cast<double>(frame.fragments_blended) / static_cast<double>(frame.lanes);
-         });
+         return of_frame(of, [](const WholeFrame& frame) { return 100 * frame.share_of_lanes_blending(); });
        },
        false},
       {"speed-up of termination in software",

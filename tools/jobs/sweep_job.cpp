@@ -335,10 +335,9 @@ std::vector<std::optional<double>> columns_of(const RunResult& run, const std::o
     if (error && column == ssim_column) values.emplace_back(error->ssim);
     if (error && column == max_error_column) values.emplace_back(error->max_abs_error);
     if (is_of_image(column)) continue;
-    const auto found = std::find_if(run.statistics.begin(), run.statistics.end(),
-                                    [&](const StatisticReport& report) { return report.name == column; });
+    const StatisticReport* const found = statistic_named(run.statistics, column);
     std::optional<double>& value = values.emplace_back();
-    if (found == run.statistics.end()) continue;
+    if (found == nullptr) continue;
     value = found->denominator ? found->quotient() : static_cast<double>(found->value);
   }
   return values;

@@ -1,40 +1,19 @@
 #include "jobs/whole_frame.h"
 
-#include <stdexcept>
-#include <string>
-
 #include <nlohmann/json.hpp>
 
-#include <vrpipe/platforms/accelerator.h>
-#include <vrpipe/platforms/software.h>
-
 #include "host/stdout_to_stderr.h"
+#include "jobs/frames_job.h"
 
 namespace vrpipe::tools {
 namespace {
 
 constexpr std::uint64_t lanes_of_a_warp = 32;
 
-double milliseconds(const KernelReport& kernel, double frequency_mhz) {
-  return static_cast<double>(kernel.cycles.value()) / (1e3 * frequency_mhz);
-}
-
-double milliseconds(const std::optional<KernelReport>& kernel, double frequency_mhz) {
-  return kernel ? milliseconds(*kernel, frequency_mhz) : 0;
-}
-
-std::uint64_t counter(const SoftwareResult& result, const std::string& name) {
-  for (const StatisticReport& statistic : result.statistics) {
-    if (statistic.name == name) return statistic.value;
-  }
-  throw std::logic_error("rendering in software counts no " + name);
-}
-
 }  // namespace
 
 WholeFrame simulate_whole_frame(const RunRequest& base, const Frame& frame, std::optional<std::uint64_t> gaussians) {
   const StdoutToStderr redirected;  // units of plugins may print
-  const double frequency_mhz = base.platform->frequency_mhz;
   WholeFrame whole;
   RunRequest request = base;
   request.variant = variant_named("baseline");
@@ -44,31 +23,33 @@ WholeFrame simulate_whole_frame(const RunRequest& base, const Frame& frame, std:
     chosen.units.insert(chosen.units.end(), {{"preparation", preparation}, {"render", render}});
     return chosen;
   };
-  const auto prepare = [&](const RunRequest& by, const SoftwareResult& software) {
+  const auto prepared = [&](const RunRequest& by, const FramePath& software) {
     const HardwarePreparation hardware = prepare_for_hardware(by, frame, gaussians);
-    return WholeFrame::Preparation{milliseconds(software.preprocess, frequency_mhz),
-                                   milliseconds(hardware.preprocess, frequency_mhz),
-                                   milliseconds(hardware.sort, frequency_mhz)};
+    const auto milliseconds = [&](const KernelReport& kernel) {
+      return milliseconds_of(kernel.cycles.value(), base.platform->frequency_mhz);
+    };
+    return WholeFrame::Preparation{software.preprocess.value_or(0),
+                                   hardware.preprocess ? milliseconds(*hardware.preprocess) : 0,
+                                   milliseconds(hardware.sort)};
   };
   {
     const RunRequest published = with("published", "published");
-    const SoftwareResult software = simulate_software(published, frame, gaussians);
-    whole.measured = prepare(published, software);
-    for (const KernelReport& kernel : software.binning) whole.lists += milliseconds(kernel, frequency_mhz);
-    whole.render = milliseconds(software.render, frequency_mhz);
-    whole.fragments_blended = counter(software, "render.lanes_blending");
-    whole.lanes = lanes_of_a_warp * counter(software, "render.warp_iterations");
+    const FramePath software = software_path(simulate_software(published, frame, gaussians));
+    whole.measured = prepared(published, software);
+    whole.lists = software.sort.value();
+    whole.render = software.raster.value();
+    whole.fragments_blended = software.count("lanes_blending").value();
+    whole.lanes = lanes_of_a_warp * software.count("warp_iterations").value();
   }
   {
     const RunRequest endless = with("papers-orin", "endless");
-    const SoftwareResult software = simulate_software(endless, frame, gaussians);
-    whole.papers = prepare(endless, software);
-    whole.endless_render = milliseconds(software.render, frequency_mhz);
-    whole.endless_fragments_blended = counter(software, "render.lanes_blending");
+    const FramePath software = software_path(simulate_software(endless, frame, gaussians));
+    whole.papers = prepared(endless, software);
+    whole.endless_render = software.raster.value();
+    whole.endless_fragments_blended = software.count("lanes_blending").value();
   }
   request.units.push_back({"accelerator", "gscore"});
-  const AcceleratorResult accelerator = simulate_accelerator(request, frame, gaussians);
-  whole.accelerator = static_cast<double>(accelerator.cycles.value()) / (1e3 * accelerator.frequency_mhz);
+  whole.accelerator = accelerator_path(simulate_accelerator(request, frame, gaussians)).frame.value();
   return whole;
 }
 

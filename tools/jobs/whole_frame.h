@@ -27,6 +27,7 @@ struct WholeFrame {
   double accelerator = 0;   ///< a frame by `accelerator=gscore`
 
   double software(const Preparation& by) const { return by.software + lists + render; }
+  double share_of_lanes_blending() const { return static_cast<double>(fragments_blended) / static_cast<double>(lanes); }
 };
 
 /// @param base       platform and settings

@@ -14,7 +14,6 @@
 #include "output/accuracy_report.h"
 #include "output/effects_page.h"
 #include "output/page_parts.h"
-#include "output/page_style.h"
 #include "output/report.h"
 
 namespace vrpipe::tools {
@@ -217,10 +216,7 @@ std::string omitted_effects_section(const AccuracyResult& result) {
 
 std::string accuracy_page(const AccuracyResult& result) {
   const std::vector<std::string> heading = accuracy_heading(result);
-  std::string text = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
-  text += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
-  text += "<title>vrpipe accuracy: " + html_escaped(result.scene.name) + "</title>\n";
-  text += std::string("<style>") + page_style + "</style>\n</head>\n<body>\n<h1>What accuracy costs in time</h1>\n";
+  std::string text = page_head("vrpipe accuracy: " + result.scene.name) + "<h1>What accuracy costs in time</h1>\n";
   // Three lines on what was drawn; what follows is to be noticed.
   for (std::size_t i = 0; i < heading.size(); ++i) {
     text += fmt::format("<p class=\"{}\">{}</p>\n", i < 3 ? "subtle" : "notice", html_escaped(heading[i]));

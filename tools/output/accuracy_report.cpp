@@ -153,7 +153,7 @@ FidelityRange range_of(const AccuracyResult& result, Fidelity fidelity) {
     range.fastest = std::max(range.fastest, level.times_as_fast);
     range.cycles_percent = std::max(range.cycles_percent, std::fabs(level.cycles_error_percent.value_or(0)));
     range.speedup_percent = std::max(range.speedup_percent, std::fabs(level.speedup_error_percent.value_or(0)));
-    if (level.run.request.variant.drawn_by == DrawnBy::pipeline)
+    if (level.run.request.variant.is_of_pipeline())
       range.quads_per_second = std::min(range.quads_per_second, level.quads_per_second);
     range.worst_image_db = std::min(range.worst_image_db, level.image.psnr_db);
   }
@@ -224,8 +224,7 @@ AccuracyTable fidelity_table(const AccuracyResult& result) {
           level.speedup ? fmt::format("{:.3f}", *level.speedup) : "-", signed_percent(level.speedup_error_percent),
           fmt::format("{:.2f}", level.cpu_seconds), fmt::format("{:.2f}x", level.times_as_fast),
           level.dominated ? "yes" : "",
-          run.request.variant.drawn_by == DrawnBy::pipeline ? fmt::format("{:.2f}", level.quads_per_second * 1e-6)
-                                                            : "-",
+          run.request.variant.is_of_pipeline() ? fmt::format("{:.2f}", level.quads_per_second * 1e-6) : "-",
           grouped(run.kernel_events), signed_percent(level.fragments_blended_error_percent),
           decibels(level.image.psnr_db)},
          false});

@@ -7,7 +7,7 @@
 
 #include "output/compare_page_style.h"
 #include "output/compare_sections.h"
-#include "output/page_style.h"
+#include "output/page_parts.h"
 #include "output/svg_plot.h"
 
 namespace vrpipe::tools {
@@ -33,12 +33,9 @@ std::string compare_page(const JobResult& result) {
                                           {"notes", "Anomalies and notes", notes_section(result)},
                                           {"settings", "Every parameter", parameters_section(result)}};
   const bool is_comparison = result.runs.size() > 1;
-  const std::string title = (is_comparison ? "vrpipe compare: " : "vrpipe run: ") + html_escaped(result.scene.name);
-  std::string text = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
-  text += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" + title + "</title>\n";
-  text += std::string("<style>") + page_style + compare_page_style + "</style>\n<script>" + compare_page_watch +
-          "</script>\n</head>\n<body>\n<h1>" + html_escaped(result.scene.name) +
-          (is_comparison ? ": GPUs compared" : ": a run") + "</h1>\n";
+  const std::string title = (is_comparison ? "vrpipe compare: " : "vrpipe run: ") + result.scene.name;
+  std::string text = page_head(title, compare_page_style, compare_page_watch) + "<h1>" +
+                     html_escaped(result.scene.name) + (is_comparison ? ": GPUs compared" : ": a run") + "</h1>\n";
   text += heading_section(result) + "<nav>";
   for (const PageSection& section : sections) {
     if (!section.body.empty()) text += fmt::format("<a href=\"#{}\">{}</a>", section.id, section.title);

@@ -12,18 +12,6 @@
 namespace vrpipe::tools {
 namespace {
 
-Json kernels_json(const FramePath& path) {
-  Json kernels = Json::array();
-  for (const KernelReport& kernel : path.kernels) {
-    kernels.push_back({{"name", kernel.name},
-                       {"items", kernel.items},
-                       {"bytes", kernel.bytes},
-                       {"cycles", kernel.cycles ? Json(*kernel.cycles) : Json()},
-                       {"bound_by", kernel.cycles ? Json(kernel.bound_by) : Json()}});
-  }
-  return kernels;
-}
-
 Json kernel_parameters_json(const FramePath& path, const Platform& platform) {
   const std::vector<ParameterListing> listings = all_parameters(&platform);
   Json values = Json::object();
@@ -68,7 +56,7 @@ Json path_json(const FramePath& path, const Platform& platform) {
           {"bound_by", path.bound_by.empty() ? Json() : Json(path.bound_by)},
           {"expected_error_percent", optional_json(path.expected_error_percent)},
           {"counts", counts_json(path.counts)},
-          {"kernels", kernels_json(path)},
+          {"kernels", kernels_json(path.kernels)},
           {"implementations", std::move(implementations)},
           {"parameters", kernel_parameters_json(path, platform)},
           {"result_hash", path.result_hash},

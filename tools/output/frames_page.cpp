@@ -11,7 +11,6 @@
 #include "output/frames_report.h"
 #include "output/machines_text.h"
 #include "output/page_parts.h"
-#include "output/page_style.h"
 #include "output/report.h"
 #include "output/svg_plot.h"
 #include "output/svg_stacks.h"
@@ -22,13 +21,8 @@ namespace {
 constexpr const char* software_color = "#0072b2";
 constexpr const char* hardware_color = "#d1400f";
 
-std::string label_of(const FramePath& path) { return fmt::format("{} ({})", path.path, path.name); }
-
 double count_in(const FramePath& path, const std::string& name) {
-  for (const auto& [each, value] : path.counts) {
-    if (each == name) return static_cast<double>(value);
-  }
-  return 0;
+  return static_cast<double>(path.count(name).value_or(0));
 }
 
 const FramePath* path_named(const FramesResult& result, const std::string& name) {
@@ -49,7 +43,7 @@ std::string time_figure(const FramesResult& result) {
   StackGroup& group = plot.groups.emplace_back();
   for (const FramePath& path : result.paths) {
     const std::array<double, 3> parts{path.preprocess.value_or(0), path.sort.value_or(0), path.raster.value_or(0)};
-    group.bars.push_back({label_of(path), {parts.begin(), parts.end()}, fmt::format("{:.2f} ms", *path.frame)});
+    group.bars.push_back({path.label(), {parts.begin(), parts.end()}, fmt::format("{:.2f} ms", *path.frame)});
     csv.row({path.path, path.name, csv_number(parts[0]), csv_number(parts[1]), csv_number(parts[2]),
              csv_number(*path.frame)});
   }
@@ -69,7 +63,7 @@ std::string speedup_figure(const FramesResult& result) {
   plot.legend = {{"over software", software_color}, {"over hardware", hardware_color}};
   plot.line = 1;
   for (const FramePath& path : result.paths) {
-    BarGroup group{label_of(path), {}, {}};
+    BarGroup group{path.label(), {}, {}};
     const double over_software = *software->frame / *path.frame, over_hardware = *hardware->frame / *path.frame;
     group.bars = {{0, over_software, software_color, fmt::format("{:.2f}x over software", over_software)},
                   {0, over_hardware, hardware_color, fmt::format("{:.2f}x over hardware", over_hardware)}};
@@ -89,7 +83,7 @@ std::string raster_figure(const FramesResult& result) {
   plot.line = 1;
   const auto add = [&](const FramePath& path) {
     const double over = *path.raster / *hardware->raster;
-    plot.groups.push_back({label_of(path), {{0, over, hardware_color, fmt::format("{:.2f}", over)}}, {}});
+    plot.groups.push_back({path.label(), {{0, over, hardware_color, fmt::format("{:.2f}", over)}}, {}});
   };
   for (const FramePath& path : result.paths) {
     if (path.path != "software" && path.path != "accelerator") add(path);
@@ -156,7 +150,7 @@ std::string pictures(const FramesResult& result) {
     text += fmt::format(
         "<figure><figcaption><b>{0}</b></figcaption><img alt=\"{0}\" style=\"width:100%\" width=\"{1}\" height=\"{2}\" "
         "src=\"{3}\"></figure>\n",
-        html_escaped(label_of(result.paths[i])), picture.width, picture.height, png_uri(picture));
+        html_escaped(result.paths[i].label()), picture.width, picture.height, png_uri(picture));
   }
   return text + "</div>\n";
 }
@@ -165,11 +159,8 @@ std::string pictures(const FramesResult& result) {
 
 std::string frames_page(const FramesResult& result) {
   const RunRequest& request = result.runs.front().request;
-  std::string text =
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>vrpipe frames: " +
-      html_escaped(result.scene.name) + "</title>\n<style>" + page_style + "</style>\n</head>\n<body>\n<h1>" +
-      html_escaped(result.scene.name) + ": whole frames</h1>\n";
+  std::string text = page_head("vrpipe frames: " + result.scene.name) + "<h1>" + html_escaped(result.scene.name) +
+                     ": whole frames</h1>\n";
   text += fmt::format("<p>{} splats, {}x{}, on {} at {}.</p>\n", grouped(result.scene.gaussians_visible), result.width,
                       result.height, html_escaped(request.platform->name), vrpipe::name_of(request.fidelity));
   text += "<div class=\"scroll\"><pre>" + html_escaped(frames_report(result, TextStyle{})) + "</pre></div>\n";

@@ -21,31 +21,25 @@ std::string milliseconds_text(const std::optional<double>& value) {
   return value ? fmt::format("{:.3f}", *value) : "-";
 }
 
-std::optional<std::uint64_t> count_of(const FramePath& path, const std::string& name) {
-  const auto found =
-      std::find_if(path.counts.begin(), path.counts.end(), [&](const auto& count) { return count.first == name; });
-  return found == path.counts.end() ? std::nullopt : std::optional(found->second);
-}
-
 /// Of lanes in all iterations of warps.
 std::string lanes_text(const FramePath& software) {
-  const std::uint64_t iterations = count_of(software, "warp_iterations").value_or(0);
+  const std::uint64_t iterations = software.count("warp_iterations").value_or(0);
   if (iterations == 0) return "";
   const auto percent = [&](const char* name, double of) {
-    return fmt::format("{:.1f} %", 100 * static_cast<double>(count_of(software, name).value_or(0)) / of);
+    return fmt::format("{:.1f} %", 100 * static_cast<double>(software.count(name).value_or(0)) / of);
   };
   const double lanes = 32 * static_cast<double>(iterations);
   return fmt::format(
       "software: {} pairs, {} warp iterations; of their lanes {} blend, {} are pruned, {} are dead beside a living\n"
       "one, {} stop; in {} of the iterations no lane blends\n",
-      grouped(count_of(software, "pairs").value_or(0)), grouped(iterations), percent("lanes_blending", lanes),
+      grouped(software.count("pairs").value_or(0)), grouped(iterations), percent("lanes_blending", lanes),
       percent("lanes_pruned", lanes), percent("lanes_dead", lanes), percent("lanes_stopping", lanes),
       percent("iterations_without_blending", static_cast<double>(iterations)));
 }
 
 /// Of the list entries of an accelerator, and what was published of it.
 std::string entries_text(const FramePath& accelerator) {
-  const auto count = [&](const char* name) { return grouped(count_of(accelerator, name).value_or(0)); };
+  const auto count = [&](const char* name) { return grouped(accelerator.count(name).value_or(0)); };
   const auto published = [&](const char* name) {
     const auto found = std::find_if(accelerator.parameters.begin(), accelerator.parameters.end(),
                                     [&](const auto& each) { return each.first == name; });
@@ -91,9 +85,8 @@ std::string energies_text(const FramesResult& result, const TextStyle& style) {
   for (const FramePath& path : result.paths) {
     const FrameEnergy& energy = path.energy;
     has_any = has_any || energy.frame;
-    table.row({printable(fmt::format("{} ({})", path.path, path.name)), nominal(energy.preprocess),
-               nominal(energy.sort), nominal(energy.raster), nominal(energy.frame),
-               energy.frame ? between(*energy.frame) : "-",
+    table.row({printable(path.label()), nominal(energy.preprocess), nominal(energy.sort), nominal(energy.raster),
+               nominal(energy.frame), energy.frame ? between(*energy.frame) : "-",
                energy.over_hardware ? fmt::format("{:.2f}x", energy.over_hardware->nominal) : "-"});
   }
   return has_any ? table.text(style) + "\n" : "";
@@ -112,8 +105,8 @@ std::string frames_report(const FramesResult& result, const TextStyle& style) {
                                      [](const FramePath& path) { return path.path == "hardware"; });
   for (const FramePath& path : result.paths) {
     const bool is_timed = path.frame && hardware->frame && *hardware->frame > 0;
-    table.row({printable(fmt::format("{} ({})", path.path, path.name)), milliseconds_text(path.preprocess),
-               milliseconds_text(path.sort), milliseconds_text(path.raster), milliseconds_text(path.frame),
+    table.row({printable(path.label()), milliseconds_text(path.preprocess), milliseconds_text(path.sort),
+               milliseconds_text(path.raster), milliseconds_text(path.frame),
                is_timed ? fmt::format("{:.2f}x", *path.frame / *hardware->frame) : "-",
                milliseconds_text(path.interval),
                path.expected_error_percent ? fmt::format("{:g}", *path.expected_error_percent) : "-",
@@ -150,7 +143,7 @@ std::string frames_report(const FrameViewsResult& result, const TextStyle& style
     const FramePath& path = first.paths[i];
     const std::optional<Distribution> frame = frame_distribution(result, i),
                                       over = over_hardware_distribution(result, i);
-    std::vector<std::string> cells{printable(fmt::format("{} ({})", path.path, path.name))};
+    std::vector<std::string> cells{printable(path.label())};
     for (const double Distribution::*value : {&Distribution::minimum, &Distribution::median, &Distribution::maximum})
       cells.push_back(frame ? milliseconds_text(*frame.*value) : "-");
     for (const double Distribution::*value : {&Distribution::minimum, &Distribution::median, &Distribution::maximum})

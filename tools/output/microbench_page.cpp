@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include "output/page_parts.h"
-#include "output/page_style.h"
 
 namespace vrpipe::tools {
 
@@ -72,10 +71,7 @@ std::string table_html(const MicrobenchResult& result) {
 
 std::string microbench_page(const MicrobenchRun& run) {
   const Platform& platform = *run.request.platform;
-  std::string text = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
-  text += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
-  text += "<title>vrpipe microbench: " + html_escaped(platform.name) + "</title>\n";
-  text += std::string("<style>") + page_style + own_style + "</style>\n</head>\n<body>\n<h1>Microbenchmarks</h1>\n";
+  std::string text = page_head("vrpipe microbench: " + platform.name, own_style) + "<h1>Microbenchmarks</h1>\n";
   text += fmt::format("<p class=\"subtle\">{} ({}), {} fidelity. What differs from what is published is marked.</p>\n",
                       html_escaped(platform.name), html_escaped(platform.description),
                       vrpipe::name_of(run.request.fidelity));

@@ -183,7 +183,7 @@ std::string slices_csv(const std::vector<RunResult>& runs, const std::vector<std
 std::string course_section(const JobResult& result) {
   std::vector<RunResult> runs;
   for (const RunResult& run : result.runs) {
-    if (run.request.variant.drawn_by == DrawnBy::pipeline) runs.push_back(run);
+    if (run.request.variant.is_of_pipeline()) runs.push_back(run);
   }
   const auto has_course = [](const RunResult& run) { return run.intervals && !run.intervals->from.empty(); };
   if (runs.empty() || !std::all_of(runs.begin(), runs.end(), has_course)) return {};

@@ -9,6 +9,7 @@
 #include "image/base64.h"
 #include "image/images.h"
 #include "output/compare_page_style.h"
+#include "output/page_style.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -94,6 +95,15 @@ std::string figure(const std::string& name, const Plot& plot, const std::string&
 }
 std::string figure(const std::string& name, const BarPlot& plot, const std::string& caption) {
   return html(PageFigure{file_name(name), caption, svg(plot), csv_of(plot)});
+}
+
+std::string page_head(const std::string& title, const std::string& style, const std::string& script) {
+  std::string text =
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
+      html_escaped(title) + "</title>\n<style>" + page_style + style + "</style>\n";
+  if (!script.empty()) text += "<script>" + script + "</script>\n";
+  return text + "</head>\n<body>\n";
 }
 
 std::string html_table(const std::vector<std::string>& heading, const std::vector<PageRow>& rows,

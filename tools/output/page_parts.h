@@ -36,6 +36,12 @@ std::string figure(const std::string& name, const BarPlot& plot, const std::stri
 /// Links that save data.
 std::string csv_link(const std::string& name, const std::string& csv);
 
+/// A page up to its <body>.
+/// @param title   in plain text
+/// @param style   of its own, behind that of all pages
+/// @param script  that runs before anything is shown
+std::string page_head(const std::string& title, const std::string& style = "", const std::string& script = "");
+
 /// A row of cells in plain text.
 struct PageRow {
   std::vector<std::string> cells;

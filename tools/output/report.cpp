@@ -53,7 +53,7 @@ std::string upper(std::string text) {
   return text;
 }
 
-bool is_of_pipeline(const RunResult& run) { return run.request.variant.drawn_by == DrawnBy::pipeline; }
+bool is_of_pipeline(const RunResult& run) { return run.request.variant.is_of_pipeline(); }
 
 /// Builds rows with one cell for each run.
 class RunTable {

@@ -9,7 +9,6 @@
 #include "image/base64.h"
 #include "image/picture.h"
 #include "output/page_parts.h"
-#include "output/page_style.h"
 #include "output/reproduce_answers.h"
 
 namespace vrpipe::tools {
@@ -172,12 +171,7 @@ std::string maps_html(const Reproduction& of) {
 }  // namespace
 
 std::string reproduction_page(const Reproduction& of) {
-  std::string text =
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<title>vrpipe reproduce</title>\n";
-  text += std::string("<style>") + page_style + own_style +
-          "</style>\n</head>\n<body>\n<h1>The paper's results, reproduced</h1>\n";
+  std::string text = page_head("vrpipe reproduce", own_style) + "<h1>The paper's results, reproduced</h1>\n";
   for (const std::string& line : reproduction_heading(of))
     text += "<p class=\"subtle\">" + html_escaped(line) + "</p>\n";
   text += fmt::format("<p class=\"{}\">{}</p>\n", of.result.plan.quick ? "verdict notice" : "verdict",

@@ -370,13 +370,12 @@ ReportTable frames_table(const Reproduction& of) {
     if (scene.frame == nullptr) return {};
     const WholeFrame& frame = *scene.frame;
     const WholeFrame::Preparation& by = frame.measured;
-    const double draw = scene.runs[0]->run.milliseconds, het_qm = scene.runs[3]->run.milliseconds;
-    const double hardware = by.hardware() + draw;
-    table.rows.push_back(
-        {scene_label(of, scene), ms(by.software), ms(frame.lists), ms(frame.render), ms(frame.endless_render),
-         number(100 * static_cast<double>(frame.fragments_blended) / static_cast<double>(frame.lanes), "{:.1f}"),
-         ms(by.projection), ms(by.sort), ms(draw), ms(het_qm), ms(frame.accelerator),
-         times(frame.software(by) / hardware), times(hardware / (by.hardware() + het_qm))});
+    const FrameTimes whole = frame_times(scene, &WholeFrame::measured);
+    table.rows.push_back({scene_label(of, scene), ms(by.software), ms(frame.lists), ms(frame.render),
+                          ms(frame.endless_render), number(100 * frame.share_of_lanes_blending(), "{:.1f}"),
+                          ms(by.projection), ms(by.sort), ms(whole.draw), ms(scene.runs[3]->run.milliseconds),
+                          ms(frame.accelerator), times(whole.software / whole.hardware),
+                          times(whole.hardware / whole.het_qm)});
   }
   table.note =
       "Simulated milliseconds, kernels at lt (docs/software.md); preparation at prices that were measured on a GH100. "

@@ -218,18 +218,6 @@ Json storage_json(const RunRequest& request) {
   return {{"tgc", storage.tgc_bytes}, {"qru", storage.qru_bytes}};
 }
 
-Json kernels_json(const RunResult& run) {
-  Json kernels = Json::array();
-  for (const KernelReport& kernel : run.kernels) {
-    kernels.push_back({{"name", kernel.name},
-                       {"items", kernel.items},
-                       {"bytes", kernel.bytes},
-                       {"cycles", kernel.cycles ? Json(*kernel.cycles) : Json()},
-                       {"bound_by", kernel.cycles ? Json(kernel.bound_by) : Json()}});
-  }
-  return kernels;
-}
-
 /// @param parameters  of platform_json()
 Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, const EffectCosts* costs,
               const Json& parameters) {
@@ -258,9 +246,9 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, con
                {"quad_merging_storage_bytes", run.request.variant.quad_merging ? storage_json(run.request) : Json()},
                {"kernel_events", run.kernel_events},
                {"outside_validated_range", run.outside_validated_range}};
-  if (run.request.variant.drawn_by != DrawnBy::pipeline) {
+  if (!run.request.variant.is_of_pipeline()) {
     json["fidelity"] = vrpipe::name_of(run.request.fidelity);
-    json["kernels"] = kernels_json(run);
+    json["kernels"] = kernels_json(run.kernels);
   }
   if (run.intervals) json["intervals"] = intervals_json(*run.intervals);
   if (costs != nullptr) json["all_effects"]["host_seconds"] = {{"with", costs->with_all}, {"without", costs->without}};
@@ -268,6 +256,18 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, con
 }
 
 }  // namespace
+
+Json kernels_json(const std::vector<KernelReport>& reports) {
+  Json kernels = Json::array();
+  for (const KernelReport& kernel : reports) {
+    kernels.push_back({{"name", kernel.name},
+                       {"items", kernel.items},
+                       {"bytes", kernel.bytes},
+                       {"cycles", kernel.cycles ? Json(*kernel.cycles) : Json()},
+                       {"bound_by", kernel.cycles ? Json(kernel.bound_by) : Json()}});
+  }
+  return kernels;
+}
 
 Json typed_value(const Parameter& parameter, const std::string& value) {
   if (dynamic_cast<const Integer*>(&parameter) != nullptr) return number_or_null<std::uint64_t>(value);

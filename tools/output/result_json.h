@@ -31,6 +31,8 @@ Json bottleneck_json(const RunResult& run);
 /// Of all units that the contract names; null where nothing has time.
 Json utilization_json(const RunResult& run);
 Json counts_json(const std::vector<std::pair<std::string, std::uint64_t>>& counts);
+/// Kernels, or stages of an accelerator.
+Json kernels_json(const std::vector<KernelReport>& reports);
 Json scene_json(const SceneSummary& scene, std::uint32_t width, std::uint32_t height);
 /// Of the first run's platform, with the parameters that its variants start from; what differs from them is in
 /// changed_parameters_json().

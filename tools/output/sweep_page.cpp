@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 
 #include "output/page_parts.h"
-#include "output/page_style.h"
 #include "output/sweep_report.h"
 
 namespace vrpipe::tools {
@@ -158,9 +157,7 @@ std::string points_section(const SweepFindings& findings) {
 
 std::string sweep_page(const SweepFindings& findings) {
   const Study& study = findings.result.study;
-  std::string text = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
-  text += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>vrpipe sweep</title>\n";
-  text += std::string("<style>") + page_style + "</style>\n</head>\n<body>\n<h1>A study</h1>\n";
+  std::string text = page_head("vrpipe sweep") + "<h1>A study</h1>\n";
   text += fmt::format("<p class=\"verdict\">{} points", study.points.size());
   if (study.seed) text += fmt::format(", a sample of {} (seed {})", study.product, *study.seed);
   text += "</p>\n<ul>\n";

@@ -63,6 +63,8 @@ struct Variant {
   std::vector<UnitChoice> changed_units = {};
   std::vector<Setting> changed_settings = {};
   DrawnBy drawn_by = DrawnBy::pipeline;
+
+  bool is_of_pipeline() const { return drawn_by == DrawnBy::pipeline; }
 };
 /// The paper's four, then those that were added.
 const std::vector<Variant>& variants();
@@ -181,6 +183,9 @@ struct StatisticReport {
   std::optional<double> quotient() const;
 };
 
+/// Null where nothing of that name was declared.
+const StatisticReport* statistic_named(const std::vector<StatisticReport>& statistics, const std::string& name);
+
 /// What was counted of one draw: of `Counts`, what is a draw's own. Over all draws of a frame each sums to the frame's.
 /// A merged quad is blended for the draw of its front quad, and counted as merged for that of its back quad.
 struct DrawReport {
@@ -270,9 +275,10 @@ DrawState draw_state_of(const RunRequest& request, const std::vector<Setting>& o
 DepthFormat depth_format_of(const RunRequest& request);
 
 /// Runs one variant. What draws outside the pipeline draws what is projected already, in a target of its own, RGBA32F, and
-/// terminates by its own rule; its time is that of lists and rendering, in cycles of the platform. Checks conservation, order per pixel and that the states of each unit sum to the cycles; throws
-/// SimulationFault if one is broken and UserError for a configuration that does not exist. With time, one simulation
-/// per process is the safe way; tests run several with `fresh_simulation()`.
+/// terminates by its own rule; its time is that of lists and rendering, in cycles of the platform. Checks conservation,
+/// order per pixel and that the states of each unit sum to the cycles; throws SimulationFault if one is broken and UserError
+/// for a configuration that does not exist. With time, one simulation per process is the safe way; tests run several with
+/// `fresh_simulation()`.
 /// `progress`, if given, goes from 0 to 1.
 RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<float>* progress = nullptr);
 /// A frame of one draw, of the state that the request gives.
