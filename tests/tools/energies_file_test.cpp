@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "jobs/energy_table.h"
+#include "one_event_energies.h"
 
 namespace vrpipe::testing {
 namespace {
@@ -86,23 +87,8 @@ TEST_F(EnergiesFile, TheShippedTableIsPrintedAsAFileThatGivesTheSame) {
 }
 
 TEST_F(EnergiesFile, ATableOfOnesOwnCountsWhatItNames) {
-  write("e.toml", R"(
-schema = "vrpipe.energies/1"
-process = "mine"
-[[node]]
-name = "mine"
-factor = { low = 1, nominal = 1, high = 1 }
-voltage_ratio = 1
-source = "s"
-[[event]]
-name = "quad"
-unit = "mine"
-count = ["2 * quads_blended", "fragments_pruned / 4"]
-node = "mine"
-pj = { low = 1, nominal = 2, high = 3 }
-source = "s"
-meaning = "m"
-)");
+  write("e.toml", one_event_energies("mine", R"(["2 * quads_blended", "fragments_pruned / 4"])",
+                                     "{ low = 1, nominal = 2, high = 3 }"));
   const json result = json_of({"compare", "--scene", "tiny.spl", "--fidelity", "lt", "--energies", "e.toml"});
   for (const json& run : result["runs"]) {
     const double count =

@@ -13,6 +13,7 @@
 
 #include "documented_keys.h"
 #include "image/images.h"
+#include "one_event_energies.h"
 #include "tool_test_support.h"
 
 namespace vrpipe::testing {
@@ -162,23 +163,8 @@ TEST_F(Frames, EnergyIsOfAllPartsByOneTable) {
 }
 
 TEST_F(Frames, EnergyOfAnAcceleratorIsItsPowerAndItsMemorys) {
-  write("e.toml", R"(
-schema = "vrpipe.energies/1"
-process = "mine"
-[[node]]
-name = "mine"
-factor = { low = 1, nominal = 1, high = 1 }
-voltage_ratio = 1
-source = "s"
-[[event]]
-name = "byte"
-unit = "DRAM"
-count = ["kernel.dram_bytes", "quads_blended"]
-node = "mine"
-pj = { low = 1e6, nominal = 2e6, high = 3e6 }
-source = "s"
-meaning = "m"
-)");
+  write("e.toml", one_event_energies("DRAM", R"(["kernel.dram_bytes", "quads_blended"])",
+                                     "{ low = 1e6, nominal = 2e6, high = 3e6 }"));
   const json accelerator = by_path(frames({"--fidelity", "lt", "--energies", "e.toml"}))["accelerator"];
   double bytes = 0;
   for (const json& each : accelerator["bytes"]) bytes += each.get<double>();

@@ -32,7 +32,7 @@ class Paths : public ToolTest {
 TEST_F(Paths, AnOutputIsNeverAnInput) {
   const std::vector<std::string> same{"cannot write file", "is the same file", "name another file"};
   run_refused({"--scene", "tiny.spl", "--save-draw", "tiny.spl"}, same);
-  run_refused({"--scene", "tiny.spl", "--json", "../work/./tiny.spl"}, {"--scene tiny.spl is the same file"});
+  run_refused({"--scene", "tiny.spl", "--json", "../folder/./tiny.spl"}, {"--scene tiny.spl is the same file"});
   write("c.json", "[]");
   run_refused({"--camera", "c.json#3", "--json", "c.json"}, {"(--json c.json): --camera c.json is the same file"});
   refused({"accuracy", "--scene", "tiny.spl", "--html", "tiny.spl"}, same);

@@ -74,7 +74,7 @@ class ToolTest : public ::testing::Test {
   }
 
   /// Where commands run; holds tiny.spl.
-  std::filesystem::path folder() const { return base_ / "work"; }
+  std::filesystem::path folder() const { return base_ / "folder"; }
 
   std::filesystem::path write(const std::string& name, const std::string& bytes) const {
     std::ofstream(folder() / name, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
