@@ -85,13 +85,19 @@ void ColorRop<Format, Rounding>::check_end() {
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
-void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) {
+SectoredCache* ColorRop<Format, Rounding>::cache() {
   if (!cache_) {
     CacheOrganization organization = time_.cache;
     if (!cache_order_gate_.is_active()) organization.replacement = Replacement::random;  // which keeps no order
     cache_.emplace(organization, cache_statistics);
     if (!cache_order_gate_.is_active()) cache_->before_eviction([this] { cache_order_gate_.enter(); });
   }
+  return &*cache_;
+}
+
+template <ColorFormat Format, BlendRounding Rounding>
+void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) {
+  if (!cache_) cache();
   const std::uint64_t tile = surface_->address(warp.tile, 0);
   // Where a line of the tile is in `out.lines`, if it is there. Without branches, which would be mispredicted.
   std::array<std::uint8_t, positions_per_tile> place_of{};
