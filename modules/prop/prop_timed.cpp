@@ -154,9 +154,10 @@ class TimedProp : public TimedUnit {
       charge(UnitState::blocked, left);
       color_.postpone(left);
     } else {
-      // A warp without survivors takes the cycle in which it is passed over.
-      left = color_.take(from, time_.color_rate.items).last;
-      did(PropWork::empty_warps, 1, left);
+      // A warp without survivors takes the cycle in which it is passed over, or what quads before it have left of that.
+      left = std::max(from, color_.next());
+      if (color_.taken_of(left) == 0) did(PropWork::empty_warps, 1, left);
+      color_.hold(left + 1);
       warp.release();
     }
     return left;
