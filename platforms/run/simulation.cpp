@@ -506,6 +506,13 @@ void run_untimed(const Configuration& configuration, std::atomic<float>* progres
   for (const std::string& reason : others->unknown()) result.outside_validated_range.push_back(reason);
 }
 
+/// At lt. A draw takes at least as long as its busiest resource works, which lt knows; where that never rests, no order of events
+/// matters. What was measured of the rest: benchmarks/lt_errors.
+double expected_error_percent(double occupancy) {
+  const double undecided = 1 - occupancy;
+  return 0.2 + 2 * undecided / (undecided + 0.1);
+}
+
 RunResult simulate_pipeline(const RunRequest& request, const Frame& frame, std::atomic<float>* progress) {
   check_sampling_has_time(request);
   check_may_stop(request);
@@ -523,6 +530,9 @@ RunResult simulate_pipeline(const RunRequest& request, const Frame& frame, std::
   }
   if (has_time(request.fidelity)) {
     run_clocked(configuration, progress, result);
+    if (request.fidelity == Fidelity::cycle) result.expected_error_percent = 0;
+    if (request.fidelity == Fidelity::lt && result.bottleneck && result.outside_validated_range.empty())
+      result.expected_error_percent = expected_error_percent(result.bottleneck->occupancy);
   } else {
     run_untimed(configuration, progress, result);
   }

@@ -1,7 +1,5 @@
 #include <vrpipe/platforms/validated_range.h>
 
-#include <cstdint>
-
 #include "bound/bound.h"
 
 #include <fmt/format.h>
@@ -10,31 +8,6 @@
 #include <vrpipe/platforms/netlist.h>
 
 namespace vrpipe {
-
-namespace {
-
-// Parameters of links, each tried alone on agx-orin-ideal-memory, baseline and het+qm: errors of 1.1 % at most inside, of up to 40 % outside.
-constexpr std::uint64_t most_depth = 1024;
-constexpr std::uint64_t most_latency = 16;
-constexpr std::uint64_t most_latency_of_color = 4;
-
-void check_link(const Link& link, std::vector<std::string>& reasons) {
-  const std::string color = ".out_color";
-  const bool is_color =
-      link.from.size() > color.size() && link.from.compare(link.from.size() - color.size(), color.size(), color) == 0;
-  const std::uint64_t latency = is_color ? most_latency_of_color : most_latency;
-  const auto above = [&](const char* parameter, std::uint64_t value, std::uint64_t most) {
-    if (value <= most) return;
-    reasons.push_back("link." + link.name() + "." + parameter + "=" + std::to_string(value) + " is above " +
-                      std::to_string(most) + ", the most that was validated");
-  };
-  above("depth", link.parameters->depth, most_depth);
-  above("latency_cycles", link.parameters->latency_cycles, latency);
-  // A warp passes in one piece, at cycle by parts that leave room between them to others.
-  if (is_color) above("items_per_cycle", link.parameters->items_per_cycle, 0);
-}
-
-}  // namespace
 
 std::vector<std::string> outside_validated_range(const std::vector<std::pair<std::string, std::string>>& parameters) {
   std::vector<std::string> reasons;
@@ -63,7 +36,6 @@ std::vector<std::string> outside_validated_range(const Netlist& netlist) {
       reasons.push_back(instance.path + " is in slot " + instance.slot + ", which was not validated");
     }
   }
-  for (const Link& link : netlist.links()) check_link(link, reasons);
   for (const ForeignInstance& memory : netlist.foreign_memories()) {
     reasons.push_back("memory " + memory.path +
                       " is of another make, and asked by b_transport, whose times may be a guess of its own");

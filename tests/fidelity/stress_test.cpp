@@ -1,4 +1,7 @@
 // How far lt may be off away from the defaults.
+#include <optional>
+#include <utility>
+
 #include <vrpipe/component/error.h>
 #include <vrpipe/platforms/stress.h>
 #include <vrpipe/platforms/validated_range.h>
@@ -84,6 +87,36 @@ TEST(ValidatedRange, IsAskedWhereTimeIsApproximate) {
     request.settings = {{"sm", "cores", "1"}};
     EXPECT_EQ(run(request, draw).outside_validated_range.empty(), fidelity != Fidelity::lt) << name_of(fidelity);
   }
+}
+
+TEST(ExpectedError, IsNoneWhereCyclesAreExactAndUnknownWhereNothingIsKnown) {
+  const Draw draw = random_draw(32, 32, 20, 1);
+  const auto expected = [&](Fidelity fidelity, std::vector<Setting> settings = {}) {
+    return run(request_of("het+qm", fidelity, [&](RunRequest& r) { r.settings = std::move(settings); }), draw)
+        .expected_error_percent;
+  };
+  EXPECT_EQ(expected(Fidelity::cycle), 0);
+  EXPECT_EQ(expected(Fidelity::functional), std::nullopt);
+  EXPECT_EQ(expected(Fidelity::bound), std::nullopt);
+  EXPECT_EQ(expected(Fidelity::lt, {{"sm", "cores", "1"}}), std::nullopt) << "outside of what was validated";
+}
+
+/// What the busiest resource does takes as long at any fidelity.
+TEST(ExpectedError, IsSmallWhereTheBottleneckNeverRests) {
+  const Draw draw = random_draw(160, 120, 2000, 6);
+  const auto at_lt = [&](const char* sm_latency) {
+    return run(request_of("baseline", Fidelity::lt,
+                          [&](RunRequest& r) {
+                            r.settings = {{"sm", "fragment_latency_cycles", sm_latency}, {"sm", "warps_per_core", "8"}};
+                          }),
+               draw);
+  };
+  const RunResult busy = at_lt("1");
+  const RunResult waiting = at_lt("1000");
+  ASSERT_GT(busy.bottleneck->occupancy, 0.95);
+  ASSERT_LT(waiting.bottleneck->occupancy, 0.5);
+  EXPECT_LT(*busy.expected_error_percent, 1);
+  EXPECT_GT(*waiting.expected_error_percent, 1.5);
 }
 
 /// A unit's slots are full, and the next core has none either: all warps of a tile to one core.

@@ -65,6 +65,7 @@ RunResult full_result() {
   result.implementations = {{"qru", "caf\xe9"}, {"tc", std::string("\0\xff", 2)}};
   result.parameters = {{"tc.bins", "32"}, {"state.exponential", "exact"}};
   result.outside_validated_range = {"\xc3", ""};
+  result.expected_error_percent = 0.1 + 0.2;
   result.result_hash = "0123456789abcdef";
   result.kernel_events = 9;
   result.framebuffer.addresses.attributes = {0x10000, 123};
@@ -144,8 +145,8 @@ void expect_equal_intervals(const IntervalReport& actual, const IntervalReport& 
 /// All but the request and the surfaces. A new member has to be named here, and compared.
 void expect_equal(const RunResult& actual, const RunResult& expected) {
   const auto& [request, cycles, stopped, milliseconds, host_seconds, cpu_seconds, counts, utilization, units,
-               bottleneck, kernels, statistics, implementations, parameters, outside_validated_range, effects,
-               result_hash, kernel_events, framebuffer, draws, intervals] = actual;
+               bottleneck, kernels, statistics, implementations, parameters, outside_validated_range,
+               expected_error_percent, effects, result_hash, kernel_events, framebuffer, draws, intervals] = actual;
   ASSERT_EQ(intervals.has_value(), expected.intervals.has_value());
   if (intervals) expect_equal_intervals(*intervals, *expected.intervals);
   EXPECT_EQ(framebuffer.addresses.attributes.address, expected.framebuffer.addresses.attributes.address);
@@ -203,6 +204,7 @@ void expect_equal(const RunResult& actual, const RunResult& expected) {
   EXPECT_EQ(implementations, expected.implementations);
   EXPECT_EQ(parameters, expected.parameters);
   EXPECT_EQ(outside_validated_range, expected.outside_validated_range);
+  EXPECT_EQ(expected_error_percent, expected.expected_error_percent);
   EXPECT_EQ(result_hash, expected.result_hash);
   EXPECT_EQ(kernel_events, expected.kernel_events);
 }

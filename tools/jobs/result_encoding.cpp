@@ -62,8 +62,8 @@ VRPIPE_MEMBERS(UnitIntervals, name, cycles)
 VRPIPE_MEMBERS(StatisticIntervals, name, kind, values, denominators)
 VRPIPE_MEMBERS(IntervalReport, every, from, units, statistics)
 VRPIPE_MEMBERS(RunResult, request, cycles, stopped, milliseconds, host_seconds, cpu_seconds, counts, utilization, units,
-               bottleneck, kernels, statistics, implementations, parameters, outside_validated_range, effects,
-               result_hash, kernel_events, framebuffer, draws, intervals)
+               bottleneck, kernels, statistics, implementations, parameters, outside_validated_range,
+               expected_error_percent, effects, result_hash, kernel_events, framebuffer, draws, intervals)
 
 /// Types of members that stay behind.
 template <class Member>

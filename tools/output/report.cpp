@@ -372,6 +372,19 @@ std::string validated_text(const std::vector<RunResult>& runs) {
   return text;
 }
 
+/// How far cycles may be off, where they are not exact and that is known.
+std::string expected_error_text(const std::vector<RunResult>& runs) {
+  std::vector<std::string> parts;
+  for (const RunResult& run : runs) {
+    if (run.expected_error_percent.value_or(0) == 0) continue;
+    parts.push_back(
+        fmt::format("{}+-{:.1f} %", runs.size() > 1 ? name_of(run.request) + " " : "", *run.expected_error_percent));
+  }
+  if (parts.empty()) return {};
+  return fmt::format("{}: cycles within {}, as nine of ten runs whose bottleneck is as busy\n",
+                     vrpipe::name_of(runs.front().request.fidelity), fmt::join(parts, ", "));
+}
+
 /// What quad merging adds, once for all runs that add the same.
 std::string storage_text(const std::vector<RunResult>& runs) {
   std::vector<std::pair<std::string, std::vector<std::string>>> names_of_text;
@@ -411,7 +424,7 @@ std::string remarks(const JobResult& result) {
   text += stopped_text(runs.front());
   text += fidelities_text(runs);
   for (const RunResult& run : runs) text += bound_text(run);
-  text += validated_text(runs);
+  text += expected_error_text(runs) + validated_text(runs);
   if (const auto early = early_termination_ratio(runs)) {
     text += fmt::format("early-termination ratio {:.2f} (fragments blended without over with termination)\n", *early);
   }
@@ -489,7 +502,8 @@ std::vector<std::string> notes_of(const JobResult& result) {
   if (draws_nothing(result.runs.front(), result.scene)) {
     text += nothing_visible(result.scene, result.viewpoint.has_value()) + "\n";
   }
-  text += anomaly_text(result.runs) + validated_text(result.runs) + rejected_text(result.scene.rejected);
+  text += anomaly_text(result.runs) + expected_error_text(result.runs) + validated_text(result.runs) +
+          rejected_text(result.scene.rejected);
   for (const std::string& note : result.scene.notes) text += "note: " + note + "\n";
   text += storage_text(result.runs);
   std::vector<std::string> lines;

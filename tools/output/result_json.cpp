@@ -14,6 +14,7 @@
 #include <vrpipe/platforms/netlist.h>
 
 #include "jobs/comparison.h"
+#include "jobs/optional_json.h"
 #include "jobs/settings.h"
 #include "output/effects_report.h"
 #include "output/energy_report.h"
@@ -245,7 +246,8 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, con
                {"statistics", statistics_json(run)},
                {"quad_merging_storage_bytes", run.request.variant.quad_merging ? storage_json(run.request) : Json()},
                {"kernel_events", run.kernel_events},
-               {"outside_validated_range", run.outside_validated_range}};
+               {"outside_validated_range", run.outside_validated_range},
+               {"expected_error_percent", optional_json(run.expected_error_percent)}};
   if (!run.request.variant.is_of_pipeline()) {
     json["fidelity"] = vrpipe::name_of(run.request.fidelity);
     json["kernels"] = kernels_json(run.kernels);

@@ -28,7 +28,8 @@ Json view_run_json(const RunResult& run, const std::optional<ImageFiles>& images
           {"utilization", utilization_json(run)},
           {"result_hash", run.result_hash},
           {"images", {{"png", images ? Json(images->png) : Json()}, {"exr", images ? Json(images->exr) : Json()}}},
-          {"outside_validated_range", run.outside_validated_range}};
+          {"outside_validated_range", run.outside_validated_range},
+          {"expected_error_percent", optional_json(run.expected_error_percent)}};
 }
 
 Json view_json(const ViewResult& view, std::size_t baseline) {
