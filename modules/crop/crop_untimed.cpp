@@ -133,7 +133,8 @@ class UntimedCrop : public UntimedUnit {
   void account(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome) {
     const bool changed = outcome.changed || time_.writes_unchanged;
     if (cache_.count > 0 && changed) {
-      behaviour_->make_dirty(cache_.lines[cache_.line_of[index]].line, cache_.sectors_of[index]);
+      const QuadSectors& quad = time_.sectors_of_quads()[warp.position[index]];
+      behaviour_->make_dirty(cache_.line_of(quad).line, quad.sectors);
     }
     if (counts_) count(warp, index, outcome);
   }
