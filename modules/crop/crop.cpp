@@ -233,6 +233,17 @@ void ColorRop<Format, Rounding>::tell(std::size_t place, LaneMask live) const {
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
+template <typename ColorRop<Format, Rounding>::Way How>
+[[gnu::always_inline]] inline CropBehaviour::Outcome ColorRop<Format, Rounding>::blend_one(std::size_t place,
+                                                                                           LaneMask live,
+                                                                                           const QuadColor& color) {
+  Tally tally;
+  const Outcome outcome = blend_into<How>(surface_->quad(place), place, live, color, tally);
+  count(draw_, tally);
+  return outcome;
+}
+
+template <ColorFormat Format, BlendRounding Rounding>
 CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(DrawIndex draw, std::size_t place, LaneMask live,
                                                          const QuadColor& color) {
   if (draw != draw_) set_draw(draw);
@@ -243,15 +254,6 @@ CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(DrawIndex draw, std::si
     case Way::replacing: break;
   }
   return blend_one<Way::replacing>(place, live, color);
-}
-
-template <ColorFormat Format, BlendRounding Rounding>
-template <typename ColorRop<Format, Rounding>::Way How>
-CropBehaviour::Outcome ColorRop<Format, Rounding>::blend_one(std::size_t place, LaneMask live, const QuadColor& color) {
-  Tally tally;
-  const Outcome outcome = blend_into<How>(surface_->quad(place), place, live, color, tally);
-  count(draw_, tally);
-  return outcome;
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
