@@ -126,10 +126,12 @@ void ColorRop<Format, Rounding>::count_anomalies(std::size_t place, LaneMask liv
   QuadColor destination;
   store({red_green, blue_alpha}, destination);
   const LaneBits lanes = expand_mask(live);
-  const QuadColor sum = blend_front_to_back(destination, color);
-  const LaneBits saturated =
-      lanes & ((sum.red > largest_color) | (sum.green > largest_color) | (sum.blue > largest_color));
-  colors_saturated += popcount(sign_mask(saturated));
+  if (watches_saturation_) {
+    const QuadColor sum = blend_front_to_back(destination, color);
+    const LaneBits saturated =
+        lanes & ((sum.red > largest_color) | (sum.green > largest_color) | (sum.blue > largest_color));
+    colors_saturated += popcount(sign_mask(saturated));
+  }
 
   const LaneBits lost = lanes & (stored.alpha == destination.alpha) & ~passes(stored.alpha);
   if (sign_mask(lost) == 0) return;

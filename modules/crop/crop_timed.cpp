@@ -153,7 +153,7 @@ class TimedCrop : public TimedUnit {
   }
 
   /// Takes the time of quads whose sectors are there from a cycle on.
-  CycleInterval blend_in_turn(const ShadedWarp& warp, unsigned from, unsigned to, Cycle there) {
+  [[gnu::always_inline]] CycleInterval blend_in_turn(const ShadedWarp& warp, unsigned from, unsigned to, Cycle there) {
     // What moves takes time from blending, from when it does.
     for (; !moves_.empty() && moves_.front().at <= time_.free_from(time_.price(), there); moves_.pop()) {
       const Move& move = moves_.front();
@@ -259,7 +259,8 @@ class TimedCrop : public TimedUnit {
     return std::max(there, at);
   }
 
-  void blend(const ShadedWarp& warp, unsigned from, unsigned to, bool fetches_ahead, CycleInterval at) {
+  [[gnu::always_inline]] void blend(const ShadedWarp& warp, unsigned from, unsigned to, bool fetches_ahead,
+                                    CycleInterval at) {
     CropBehaviour::Outcomes outcomes;
     behaviour_->blend_quads(warp, from, to, outcomes);
     unsigned terminated = 0;

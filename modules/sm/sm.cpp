@@ -138,6 +138,28 @@ inline LanePair SplatShader::alpha_at(LanePair x, LanePair y, const Shape& splat
   return select(alpha > alpha_max, LanePair{} + alpha_max, alpha);
 }
 
+inline void SplatShader::count(const Warp& warp, const Threads& threads) {
+  fragments_of_back_quads += threads_in(threads.live & (threads.merged_quads * all_lanes));
+  // The threads of each draw, most often of one.
+  for (std::uint32_t left = ~0U >> (4 * (quads_per_warp - warp.count)); left != 0;) {
+    const DrawIndex draw = warp.quads[static_cast<unsigned>(__builtin_ctz(left)) / 4].draw;
+    const std::uint32_t of_draw = several_draws_ ? threads_of(warp, draw) : left;
+    const std::uint32_t covered = threads.covered & of_draw;
+    const std::uint32_t live = threads.live & of_draw;
+    const std::uint32_t quads = of_draw & 0x11111111U;  // a bit a quad
+    const std::uint32_t live_quads = (live | live >> 1U | live >> 2U | live >> 3U) & quads;
+    quads_shaded.add(draw, threads_in(quads));
+    fragments_shaded.add(draw, threads_in(covered));
+    quads_pruned.add(draw, threads_in(quads & ~live_quads));
+    fragments_pruned.add(draw, threads_in(covered & ~live));
+    if (threads.merged_quads != 0) {
+      quads_merged.add(draw, threads_in(threads.merged_quads & of_draw));
+      fragments_merged.add(draw, threads_in(threads.merged & of_draw));
+    }
+    left &= ~of_draw;
+  }
+}
+
 void SplatShader::shade(const Warp& warp, ShadedWarp& out) {
   ++fragment_warps;
   out.tile = warp.tile;
@@ -275,28 +297,6 @@ void SplatShader::shade_pairs(const Warp& warp, Threads& threads, ShadedWarp& ou
     }
   }
   out.count = static_cast<std::uint8_t>(count);
-}
-
-void SplatShader::count(const Warp& warp, const Threads& threads) {
-  fragments_of_back_quads += threads_in(threads.live & (threads.merged_quads * all_lanes));
-  // The threads of each draw, most often of one.
-  for (std::uint32_t left = ~0U >> (4 * (quads_per_warp - warp.count)); left != 0;) {
-    const DrawIndex draw = warp.quads[static_cast<unsigned>(__builtin_ctz(left)) / 4].draw;
-    const std::uint32_t of_draw = several_draws_ ? threads_of(warp, draw) : left;
-    const std::uint32_t covered = threads.covered & of_draw;
-    const std::uint32_t live = threads.live & of_draw;
-    const std::uint32_t quads = of_draw & 0x11111111U;  // a bit a quad
-    const std::uint32_t live_quads = (live | live >> 1U | live >> 2U | live >> 3U) & quads;
-    quads_shaded.add(draw, threads_in(quads));
-    fragments_shaded.add(draw, threads_in(covered));
-    quads_pruned.add(draw, threads_in(quads & ~live_quads));
-    fragments_pruned.add(draw, threads_in(covered & ~live));
-    if (threads.merged_quads != 0) {
-      quads_merged.add(draw, threads_in(threads.merged_quads & of_draw));
-      fragments_merged.add(draw, threads_in(threads.merged & of_draw));
-    }
-    left &= ~of_draw;
-  }
 }
 
 [[gnu::noinline]] void SplatShader::add_pruned(const Warp& warp, const Threads& threads, ShadedWarp& out) const {
