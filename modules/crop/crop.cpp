@@ -260,7 +260,8 @@ CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(DrawIndex draw, std::si
 
 template <ColorFormat Format, BlendRounding Rounding>
 template <typename ColorRop<Format, Rounding>::Way How>
-void ColorRop<Format, Rounding>::blend_run(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) {
+[[gnu::always_inline]] inline void ColorRop<Format, Rounding>::blend_run(const ShadedWarp& warp, unsigned from,
+                                                                         unsigned to, Outcomes& outcomes) {
   const std::size_t tile = surface_->grid().place(warp.tile, 0);
   QuadColor* const quads = &surface_->quad(tile);
   Tally tally;

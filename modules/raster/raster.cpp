@@ -237,6 +237,22 @@ void TileRasterizer::tell(const QuadBeat& made) const {
   }
 }
 
+inline void TileRasterizer::put_quads(QuadBeat& out, unsigned part, std::uint64_t coverage) const {
+  const unsigned first = 4 * quads_per_tile_row * (part >> 1U) + 4 * (part & 1U);
+  const std::uint64_t upper_left = primitive_.splat | std::uint64_t{first} << position_shift |
+                                   std::uint64_t{primitive_.triangle} << triangle_shift |
+                                   std::uint64_t{primitive_.draw} << draw_shift;
+  constexpr std::uint64_t to_the_right = std::uint64_t{1} << position_shift;
+  Words quads = upper_left + Words{0, to_the_right, 2 * to_the_right, 3 * to_the_right};
+  unsigned count = 0;
+  for (unsigned row = 0; row < 4; ++row) {
+    const Words covered = ((Words{} + coverage) >> (Words{0, 4, 8, 12} + 16 * row)) & all_lanes;
+    count += put_covered(&out.quads[count], quads, covered);
+    quads += quads_per_tile_row * to_the_right;
+  }
+  out.count = static_cast<std::uint8_t>(count);
+}
+
 bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) {
   coarse_tests = 0;
   while (true) {
@@ -338,22 +354,6 @@ std::uint64_t TileRasterizer::coverage_of_wide(const OfEdges& value) const {
     coverage |= std::uint64_t{inside} << sample;
   }
   return coverage;
-}
-
-void TileRasterizer::put_quads(QuadBeat& out, unsigned part, std::uint64_t coverage) const {
-  const unsigned first = 4 * quads_per_tile_row * (part >> 1U) + 4 * (part & 1U);
-  const std::uint64_t upper_left = primitive_.splat | std::uint64_t{first} << position_shift |
-                                   std::uint64_t{primitive_.triangle} << triangle_shift |
-                                   std::uint64_t{primitive_.draw} << draw_shift;
-  constexpr std::uint64_t to_the_right = std::uint64_t{1} << position_shift;
-  Words quads = upper_left + Words{0, to_the_right, 2 * to_the_right, 3 * to_the_right};
-  unsigned count = 0;
-  for (unsigned row = 0; row < 4; ++row) {
-    const Words covered = ((Words{} + coverage) >> (Words{0, 4, 8, 12} + 16 * row)) & all_lanes;
-    count += put_covered(&out.quads[count], quads, covered);
-    quads += quads_per_tile_row * to_the_right;
-  }
-  out.count = static_cast<std::uint8_t>(count);
 }
 
 namespace {
