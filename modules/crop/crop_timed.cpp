@@ -112,7 +112,7 @@ class TimedCrop : public TimedUnit {
       const std::size_t place = tile + warp.position[i];
       __builtin_prefetch(&surface.quad(place), 1);
       __builtin_prefetch(&warp.color[i]);
-      monitor_->blended(place, warp, i, visible.last);
+      monitor_->prefetch(place);
     }
     behaviour_->look_up(warp, from, to, cache_);
     // Places in the queue, and lines that no queued quad needs.
@@ -261,6 +261,7 @@ class TimedCrop : public TimedUnit {
 
   [[gnu::always_inline]] void blend(const ShadedWarp& warp, unsigned from, unsigned to, bool fetches_ahead,
                                     CycleInterval at) {
+    monitor_->blended(warp, from, to, at.last);
     CropBehaviour::Outcomes outcomes;
     behaviour_->blend_quads(warp, from, to, outcomes);
     unsigned terminated = 0;
