@@ -56,6 +56,9 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
       written_back_ += bits(out.lines[i].written_back);
     }
   }
+  SectoredCache* cache() override {
+    return ask("cache", [&] { return checked_->cache(); });
+  }
   void make_dirty(std::uint32_t line, std::uint32_t sectors) override {
     ask("make_dirty", [&] { checked_->make_dirty(line, sectors); });
   }

@@ -86,13 +86,19 @@ void ColorRop<Format, Rounding>::check_end() {
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
-void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) {
+SectoredCache* ColorRop<Format, Rounding>::cache() {
   if (!cache_) {
     CacheOrganization organization = time_.cache;
     if (!cache_order_gate_.is_active()) organization.replacement = Replacement::random;  // which keeps no order
     cache_.emplace(organization, cache_statistics);
     if (!cache_order_gate_.is_active()) cache_->before_eviction([this] { cache_order_gate_.enter(); });
   }
+  return &*cache_;
+}
+
+template <ColorFormat Format, BlendRounding Rounding>
+void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) {
+  if (!cache_) cache();
   const std::uint64_t tile = surface_->address(warp.tile, 0);
   // Without branches on whether a line is new, which would be mispredicted.
   std::array<std::uint8_t, quads_per_warp> needed;

@@ -75,6 +75,7 @@ class TimedCrop : public TimedUnit {
     const ColorSurface* const surface = behaviour_->surface();
     if (surface == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
     monitor_ = std::make_unique<BlendOrderMonitor>(surface->width(), surface->height());
+    if (time_.cache.replacement != Replacement::lru && !time_.fetches_ahead()) pins_ = behaviour_->cache();
     if (time_.fetches_ahead()) uses_.resize(surface->size_bytes() / time_.cache.line_bytes + 1);
   }
 
@@ -114,17 +115,25 @@ class TimedCrop : public TimedUnit {
       __builtin_prefetch(&warp.color[i]);
       monitor_->prefetch(place);
     }
-    behaviour_->look_up(warp, from, to, cache_);
     // Places in the queue, and lines that no queued quad needs.
-    Cycle at = (fetches_ahead ? ahead_ : queue_).free_from(visible.first, quads);
+    SlotPool& places = fetches_ahead ? ahead_ : queue_;
+    Cycle at = places.free_from(visible.first, 1);
+    const Cycle has_places = places.free_from(std::max(at, visible.last), quads);
+    if (pins_ != nullptr) at = line_free_from(warp, from, at);
+    behaviour_->look_up(warp, from, to, cache_);
     for (unsigned line = 0; line < cache_.count && !fetches_ahead; ++line) {
       if (cache_.lines[line].replaced) at = std::max(at, stays_[cache_.lines[line].line].last_blend);
     }
     CycleInterval looked_up = look_ups_.take(port_open_from(at), quads);
-    looked_up.last = std::max(looked_up.last, visible.last);
+    looked_up.last = std::max(looked_up.last, has_places);
     Cycle there = looked_up.first + 1;
-    for (unsigned line = 0; line < cache_.count; ++line)
-      there = std::max(there, move(cache_.lines[line], fetches_ahead, looked_up.last));
+    Cycle asked = looked_up.first;
+    for (unsigned line = 0, i = from; line < cache_.count; ++line) {
+      while (cache_.place_of[sectors_of(warp, i).line] != line) ++i;  // the first that needs it
+      asked = std::max(asked, looked_up.of_part(i - from, quads));
+      there = std::max(there, move(cache_.lines[line], fetches_ahead, asked));
+    }
+    looked_up.last = std::max(looked_up.last, asked);
     look_ups_.hold(looked_up.last);
     if (time_.port.is_on()) {
       send(time_.flits_of_reads(warp, from, to, cache_, *behaviour_->surface()), looked_up.last);
@@ -136,20 +145,39 @@ class TimedCrop : public TimedUnit {
     if (fetches_ahead) there = std::max(there, look_again(warp, from, looked_up.last));
 
     charge(UnitState::starved, looked_up.first + 1);
-    if (out_.last() > there) {
+    if (const Cycle room = std::max(out_.last(), out_.room_from()); room > there) {
       charge(UnitState::memory, there);
-      charge(UnitState::blocked, out_.last());
-      there = out_.last();
+      charge(UnitState::blocked, room);
+      there = room;
     }
     const CycleInterval blended = blend_in_turn(warp, from, to, there);
     charge(UnitState::memory, blended.first);
     charge(UnitState::busy, blended.last + 1);
-    queue_.take(quads, blended.last);
+    queue_.take(quads, blended);
+    if (pins_ != nullptr) {
+      pins_->pin(cache_.lines[0].line);
+      pinned_.push({blended.last, cache_.lines[0].line});
+    }
     any_blended_ = true;
     quads_last(blended.last + time_.latency_cycles, quads, [&](unsigned i) { return warp.draw[from + i]; });
     did(CropWork::blend, quads, blended.first, blended.last + 1);
     blend(warp, from, to, fetches_ahead, blended);
     return looked_up;
+  }
+
+  /// When a quad finds its line, or one that no queued quad needs, from a cycle on.
+  [[gnu::noinline]] Cycle line_free_from(const ShadedWarp& warp, unsigned index, Cycle at) {
+    const std::uint64_t line = time_.sectors_of_quads()[warp.position[index]].line;
+    const std::uint64_t address = behaviour_->surface()->address(warp.tile, 0) + line * time_.cache.line_bytes;
+    const auto finds_line = [&] {
+      return pins_->find(address) != SectoredCache::no_line || pins_->can_allocate(address);
+    };
+    at = port_open_from(std::max(at, look_ups_.next()));
+    for (; !pinned_.empty() && (pinned_.front().until <= at || !finds_line()); pinned_.pop()) {
+      at = std::max(at, pinned_.front().until);
+      pins_->unpin(pinned_.front().line);
+    }
+    return at;
   }
 
   /// Takes the time of quads whose sectors are there from a cycle on.
@@ -255,7 +283,7 @@ class TimedCrop : public TimedUnit {
       there = memory_.fill(again, at);
     }
     second_looks_.hold(at);
-    ahead_.take(1, at);
+    ahead_.take(1, at + 1);  // second looks come after what arrives in their cycle
     return std::max(there, at);
   }
 
@@ -300,16 +328,21 @@ class TimedCrop : public TimedUnit {
 
   void signal(const ShadedWarp& warp, unsigned from, unsigned to, const CropBehaviour::Outcomes& outcomes,
               CycleInterval at) {
+    // Those of one cycle go together.
     TerminationBeat beat;
+    Cycle cycle = at.first;
     for (unsigned i = from; i < to; ++i) {
       if (outcomes[i].terminated == 0) continue;
+      const Cycle blended = at.of_part(i - from, to - from);
+      if (beat.count > 0 && (blended != cycle || beat.count == TerminationBeat::capacity)) {
+        out_.send(beat, cycle);
+        beat.count = 0;
+      }
+      cycle = blended;
       beat.signals[beat.count++] = {warp.tile, warp.position[i], outcomes[i].terminated,
                                     context_.draw(warp.draw[i]).epoch};
-      if (beat.count < TerminationBeat::capacity) continue;
-      out_.send(beat, at.of_part(i - from, to - from));
-      beat.count = 0;
     }
-    if (beat.count > 0) out_.send(beat, at.last);
+    if (beat.count > 0) out_.send(beat, cycle);
   }
 
   struct Move {
@@ -345,6 +378,13 @@ class TimedCrop : public TimedUnit {
   std::vector<Stay> stays_;
   std::vector<TimedLineUses> uses_;  ///< by line of the surface, where tags are looked at twice
   VisitCounter visits_;
+  struct Pinned {
+    Cycle until = 0;
+    std::uint32_t line = 0;
+  };
+  /// The cache, where the line that goes is not always the one whose last use is longest ago, and so is free first.
+  SectoredCache* pins_ = nullptr;
+  Ring<Pinned> pinned_;  ///< by queued quads
   Cycle end_ = never;
   bool any_blended_ = false;
   StatisticSet more_cache_statistics_{*this, "cache"};

@@ -69,7 +69,7 @@ class TimedProp : public TimedUnit {
                         TimedOut<BinItem>& out) {
     passage.hold(out.last());
     const CycleInterval at = passage.take(visible, item.quads);
-    const CycleInterval taken = out.send(item, at, passage.cycles(item.quads));
+    const CycleInterval taken = out.send(item, at, item.beats);
     passage.hold(taken.last + 1);
     did(work, item.quads, taken.last);
     return taken;
@@ -143,17 +143,26 @@ class TimedProp : public TimedUnit {
     charge(UnitState::blocked, out_color_.last());
     Cycle left = 0;
     if (warp.count > 0) {
+      const bool joins = color_.taken_of(std::max(from, color_.next())) > 0;
+      if (!joins) {
+        charge(UnitState::starved, from);
+        charge(UnitState::blocked, out_color_.room_from());
+        color_.hold(out_color_.room_from());
+      }
       const CycleInterval at = color_.take(from, warp.count * time_.color_rate.cycles);
       charge(UnitState::starved, at.first);
       charge(UnitState::busy, at.last + 1);
       did(PropWork::color, warp.count, at.first, at.last + 1);
-      left = out_color_.send({&warp}, at, color_.cycles(warp.count * time_.color_rate.cycles)).last;
+      // Quads of one cycle go together, also those of several warps.
+      const auto cycles = static_cast<unsigned>(at.last - at.first) + (joins ? 0 : 1);
+      left = out_color_.send({&warp}, at, std::min<unsigned>(warp.count, cycles), joins).last;
       charge(UnitState::blocked, left);
-      color_.hold(left);
+      color_.postpone(left);
     } else {
-      // A warp without survivors takes the cycle in which it is passed over.
-      left = color_.take(from, time_.color_rate.items).last;
-      did(PropWork::empty_warps, 1, left);
+      // A warp without survivors takes the cycle in which it is passed over, or what quads before it have left of that.
+      left = std::max(from, color_.next());
+      if (color_.taken_of(left) == 0) did(PropWork::empty_warps, 1, left);
+      color_.hold(left + 1);
       warp.release();
     }
     return left;

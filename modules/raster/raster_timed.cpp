@@ -92,11 +92,11 @@ class TimedRaster : public TimedUnit {
         did(RasterWork::pairs, 1, now_, std::max(over, now_ + 1));
       }
       if (tile.count == 0) continue;
-      now_ = quads_out_.take(now_, tile.count).last;
-      frame_lasts(now_ + 1);
-      did(RasterWork::quads, tile.count, now_);
-      charge(UnitState::busy, now_);
-      now_ = out_.send(tile, now_).first;
+      const CycleInterval at = quads_out_.take(now_, tile.count);
+      frame_lasts(at.last + 1);
+      did(RasterWork::quads, tile.count, at.last);
+      charge(UnitState::busy, at.last);
+      now_ = out_.send(tile, at, static_cast<unsigned>(at.last - at.first) + 1).last;
       charge(UnitState::blocked, now_);
       charge(UnitState::busy, now_ + 1);
       apply_updates(now_);

@@ -46,6 +46,7 @@ class TimedSm : public TimedUnit {
                      }),
         hand_over_(timing_, context),
         scheduler_free_at_(std::size_t{timing_.cores} * timing_.schedulers_per_core, 0),
+        issues_(roomy_ ? 0 : scheduler_free_at_.size()),
         free_of_core_(timing_.cores, timing_.warps_per_core),
         vertex_slots_(timing_.vertex_warps, 0) {
     fragment_.for_each([&](const Program& each) { waiting_.resize(std::max(waiting_.size(), each.size())); });
@@ -122,7 +123,10 @@ class TimedSm : public TimedUnit {
            2 * timing.warps_to_one_core <= timing.warps_per_core;
   }
 
-  bool has_slot() const { return free_slots_ > 0 || !releases_.empty(); }
+  bool has_slot() const { return has_slot_before(never); }
+  bool has_slot_before(Cycle cycle) const {
+    return free_slots_ > 0 || (!releases_.empty() && releases_.front().at <= cycle);
+  }
 
   /// Puts a slot of the next core that has one under a warp, from `at` on or as soon as one is released.
   Cycle take_slot(TileId tile, Cycle at) {
@@ -166,10 +170,10 @@ class TimedSm : public TimedUnit {
       hand_on_until(launch);
       in_release_.ask(launch);
     }
-    while (!has_slot()) {
-      const Cycle next = next_event();
+    // The first slot that is released, by what is done before it, too.
+    for (Cycle next = next_event(); !has_slot_before(next); next = next_event()) {
       in_release_.ask(next);
-      if (has_slot() || next == never) break;
+      if (has_slot_before(next) || next == never) break;
       hand_on_until(next);
     }
     if (!has_slot()) {
@@ -237,6 +241,10 @@ class TimedSm : public TimedUnit {
   Cycle issue(const Segment& segment, std::size_t scheduler, Cycle from, Cycle there = 0) {
     Cycle& free_at = scheduler_free_at_[scheduler];
     const Cycle begin = std::max(free_at, from);
+    if (!roomy_) {
+      issues_[scheduler].forget_before(next_vertex_launch_);
+      issues_[scheduler].later.push({from, begin + segment.all() * cycles_per_instruction_});
+    }
     const Cycle merge = begin + segment.instructions * cycles_per_instruction_;
     free_at = merge + segment.merge_instructions * cycles_per_instruction_;
     frame_lasts(free_at);  // the warp's quads end after that
@@ -257,6 +265,14 @@ class TimedSm : public TimedUnit {
       done_.push_in_order({next, warp.flight}, &Event::at);
       last_done_ = std::max(last_done_, next);
     }
+  }
+
+  /// When a vertex warp that is ready in a cycle issues: behind the fragment warps that were ready before it, but not behind
+  /// later ones, which have issued already, since what a vertex warp leads to comes before the next one.
+  Cycle turn_on(std::size_t scheduler, Cycle ready) {
+    if (roomy_) return ready;
+    issues_[scheduler].forget_before(ready + 1);
+    return std::max(ready, issues_[scheduler].end);
   }
 
   /// Issues what waits from cycles up to this one, in the order of waiting.
@@ -307,13 +323,15 @@ class TimedSm : public TimedUnit {
     Cycle done = 0;
     if (warp.mark == Mark::none) {
       launch = std::max(launch, vertex_slots_[vertex_turn_]);
-      Cycle& free_at = scheduler_free_at_[vertex_scheduler_++ % scheduler_free_at_.size()];
+      const std::size_t scheduler = vertex_scheduler_++ % scheduler_free_at_.size();
       const Cycle issue = vertex_.instructions * cycles_per_instruction_;
+      const Cycle ready = fetches_ ? memory_.fetch_vertices(warp, launch) : launch;
+      done = turn_on(scheduler, ready) + issue + vertex_.stall_cycles;
+      Cycle& free_at = scheduler_free_at_[scheduler];
       free_at = std::max(free_at, launch) + issue;
       did(SmWork::vertex, vertex_.instructions, free_at - issue, free_at);
       if (lacks_fetch_) fetch_gate_.enter();
       behaviour_->shade_and_count(warp);
-      done = (fetches_ ? memory_.fetch_vertices(warp, launch) : launch) + issue + vertex_.stall_cycles;
     }
     next_vertex_launch_ = launch + 1;
     vertex_slots_[vertex_turn_] = hand_on_vertices(warp, std::max(done, launch)) + 1;
@@ -356,6 +374,19 @@ class TimedSm : public TimedUnit {
   TimedIn<VertexWarp> in_vertices_;
   HandOver hand_over_;
   std::vector<Cycle> scheduler_free_at_;
+  /// Of a scheduler, that vertex warps may come before.
+  struct Issues {
+    struct Issue {
+      Cycle ready = 0;
+      Cycle end = 0;
+    };
+    Ring<Issue> later;
+    Cycle end = 0;  ///< of all that were ready earlier
+    void forget_before(Cycle ready) {
+      for (; !later.empty() && later.front().ready < ready; later.pop()) end = later.front().end;
+    }
+  };
+  std::vector<Issues> issues_;
   std::vector<Flight> flights_;
   std::vector<std::uint32_t> free_flights_;
   std::vector<Ring<Event>> waiting_;  ///< for a scheduler: by the segment that is to issue, each by cycle

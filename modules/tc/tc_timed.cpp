@@ -19,7 +19,7 @@ class TimedTc : public TimedUnit {
       : TimedUnit(name, domain, behaviour->time().kinds()),
         out_(*this, "out_bins"),
         in_(*this, "in_quads",
-            [this](const QuadBeat& beat, CycleInterval visible) { return collect(beat, visible.first); }),
+            [this](const QuadBeat& beat, CycleInterval visible) { return collect(beat, visible.last); }),
         behaviour_(std::move(behaviour)),
         passing_(context),
         time_(behaviour_->time()),
@@ -79,10 +79,10 @@ class TimedTc : public TimedUnit {
     item.storage = &storage;
     item.tile = storage.flush.tile;
     item.quads = static_cast<std::uint32_t>(storage.flush.quads.size());
-    const unsigned beats = (item.quads + time_.quads_per_cycle - 1) / time_.quads_per_cycle;
+    item.beats = (item.quads + time_.quads_per_cycle - 1) / time_.quads_per_cycle;
     const Cycle begin = std::max({flushed, sent_, out_.last()}) + 1;
-    sent_ = out_.send(item, {begin, begin + beats - 1}, beats).last;
-    did(TcWork::beats, beats, sent_);
+    sent_ = out_.send(item, {begin, begin + item.beats - 1}, item.beats).last;
+    did(TcWork::beats, item.beats, sent_);
     sent_at_[place_] = sent_;
     place_ = place_ + 1 == sent_at_.size() ? 0 : place_ + 1;
   }

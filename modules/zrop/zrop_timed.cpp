@@ -163,12 +163,11 @@ class TimedZrop : public TimedUnit {
     const bool needs_stencil = has_cache_ && state != nullptr && state->reads_depth_stencil_early();
     const bool may_change = needs_stencil && state->tests_early() && state->writes_depth_stencil();
     const bool hi_z = total > 0 && hi_z_.wanted(quads.front().draw);
-    unsigned beats_left = 0;
     // Spread over the bin: a block whose quads are in two parts is paid for with both.
     const std::uint64_t price = blocks_.is_on() ? blocks_.of(item.tile, quads.data(), total) : 0;
     QuadBeat beat;
     beat.tile = item.tile;
-    item.quads = 0;
+    item.quads = item.beats = 0;
     for (unsigned part = 0, from = 0, end = 0; part < parts; ++part, from = end) {
       end = end_of_part(quads, from, total);
       beat.count = static_cast<std::uint8_t>(end - from);
@@ -200,14 +199,14 @@ class TimedZrop : public TimedUnit {
       item.quads += beat.count;
       left.first = std::min(left.first, at);
       left.last = at;
-      ++beats_left;
+      ++item.beats;
     }
     if (has_cache_) {
       charge(UnitState::starved, looked_up.first);
       charge(UnitState::memory, tested.first);
     }
     charge(UnitState::starved, tested.first);
-    const CycleInterval taken = out_.send(item, left, beats_left);
+    const CycleInterval taken = out_.send(item, left, item.beats);
     charge(UnitState::busy, tested.last + 1);
     charge(UnitState::blocked, taken.last);
     tests_.hold(taken.last);

@@ -19,13 +19,13 @@ StressConfiguration with_terminations_of_depth(unsigned depth, bool quick = fals
           quick};
 }
 
-/// `UNIT.PARAMETER=VALUE`, several with blanks between.
+/// `UNIT.PARAMETER=VALUE`, also of links, several with blanks between.
 StressConfiguration with(const std::string& settings, bool quick = false) {
   StressConfiguration configuration{settings, {}, {}, quick};
   for (std::size_t begin = 0; begin < settings.size();) {
     const std::size_t end = std::min(settings.find(' ', begin), settings.size());
-    const std::size_t dot = settings.find('.', begin);
     const std::size_t equals = settings.find('=', begin);
+    const std::size_t dot = settings.rfind('.', equals);
     configuration.settings.push_back({settings.substr(begin, dot - begin), settings.substr(dot + 1, equals - dot - 1),
                                       settings.substr(equals + 1, end - equals - 1)});
     begin = end + 1;
@@ -48,6 +48,12 @@ std::vector<StressConfiguration> make() {
       with("crop.input_quads=128"),
       with("crop.input_quads=256"),
       with("tc.flush_queue_bins=1"),
+      with("crop.fetch_ahead_quads=1"),
+      // Links of which an item takes many cycles, or that have places for few of what is under way.
+      with("link.raster.quads.latency_cycles=30"),
+      with("link.prop.survivors.latency_cycles=80"),
+      with("link.prop.color.latency_cycles=80"),
+      with("link.crop.terminations.latency_cycles=500"),
       // Each unit the bottleneck.
       with("draw.warps_per_1024_cycles=8"),
       with("vpo.triangles_per_cycle=1 draw.warps_per_1024_cycles=1024"),
@@ -90,6 +96,8 @@ std::vector<StressConfiguration> make() {
       with("crop.cache_bytes=262144"),
       with("l2.latency_cycles=1000", true),
       with("l2.latency_cycles=1000 crop.cache_bytes=4096"),
+      with("crop.cache_bytes=4096 crop.replacement=random"),
+      with("crop.cache_bytes=4096 crop.replacement=fifo"),
       with("crop.latency_cycles=200"),
       with("zrop.latency_cycles=200"),
       with("crop.forwarding=off", true),

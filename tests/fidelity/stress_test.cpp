@@ -12,7 +12,7 @@ using namespace testing;
 
 class Stress : public ::testing::TestWithParam<std::size_t> {};
 
-TEST_P(Stress, BoundIsBelowAndLtWithinTenPercent) {
+TEST_P(Stress, BoundIsBelowAndLtWithinFourPercent) {
   const StressConfiguration& configuration = stress_configurations()[GetParam()];
   const Draw draw = random_draw(160, 120, 2000, 6);
   for (const Variant& variant : variants()) {
@@ -23,7 +23,7 @@ TEST_P(Stress, BoundIsBelowAndLtWithinTenPercent) {
     EXPECT_LE(static_cast<double>(*result_at(Fidelity::bound).cycles), cycles) << variant.name;
     const RunResult result = result_at(Fidelity::lt);
     if (!result.outside_validated_range.empty()) continue;
-    EXPECT_NEAR(static_cast<double>(*result.cycles) / cycles, 1, 0.1) << variant.name;
+    EXPECT_NEAR(static_cast<double>(*result.cycles) / cycles, 1, 0.04) << variant.name;
   }
 }
 

@@ -47,7 +47,7 @@ TEST_P(RasterTimedTest, HandsOverItsQuadsPerCycle) {
     in.add(jobs()[0]);
     bench.run();
     EXPECT_EQ(quads_in(out), 4096U);
-    EXPECT_EQ(out.records().back().cycle, (4096 + rate - 1) / rate + 10) << "from cycle 1 on, rate " << rate;
+    EXPECT_EQ(out.records().back().last, (4096 + rate - 1) / rate + 10) << "from cycle 1 on, rate " << rate;
     EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), RasterWork::quads), 4096.0 / rate);
     EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), RasterWork::setup), 1);
   }

@@ -34,6 +34,7 @@ struct StreamPayload {
   Cycle at = never;
   Cycle last = never;
   unsigned beats = 1;
+  bool joins = false;
 };
 
 template <class Item>

@@ -98,6 +98,8 @@ class ThroughputPort {
     cycle_ = cycle;
     used_ = 0;
   }
+  /// What was taken last goes in this cycle instead, if it is later.
+  void postpone(Cycle cycle) { cycle_ = std::max(cycle_, cycle); }
   /// Cycles that so many parts fill, from the beginning of one.
   unsigned cycles(unsigned parts) const { return static_cast<unsigned>(per_cycle_.quotient_up(parts)); }
   /// The cycle in which the next part goes.
@@ -139,12 +141,16 @@ class SlotPool {
   /// The first cycle from `at` on in which so many are free, at most as many as there are.
   Cycle free_from(Cycle at, unsigned places) {
     for (; free_ < places; taken_.pop()) {
-      free_ += taken_.front().places;
-      at = std::max(at, taken_.front().until);
+      const Taken& next = taken_.front();
+      if (const auto lacking = static_cast<unsigned>(places - free_); lacking < next.places)
+        return std::max(at, next.until.of_part(lacking - 1, next.places));
+      free_ += next.places;
+      at = std::max(at, next.until.last);
     }
     return at;
   }
-  void take(unsigned places, Cycle until) {
+  /// Takes them, which `free_from` has said are free, until cycles that are spread over an interval.
+  void take(unsigned places, CycleInterval until) {
     free_ -= places;
     taken_.push({places, until});
   }
@@ -152,9 +158,9 @@ class SlotPool {
  private:
   struct Taken {
     unsigned places = 0;
-    Cycle until = 0;
+    CycleInterval until;
   };
-  unsigned free_;
+  std::int64_t free_;  ///< less those of `taken_` that are free already
   Ring<Taken> taken_;
 };
 
@@ -188,12 +194,12 @@ class TimedOut : public OutEnd<Item> {
   using OutEnd<Item>::connect;
   void connect(InPort& in, const LinkOptions& options) override;
 
-  /// Sends an item whose parts are there in the cycles `at`, and which takes the link for so many. Returns the cycles in
-  /// which it is taken.
-  CycleInterval send(const Item& item, CycleInterval at, unsigned beats = 1) {
+  /// Sends an item whose parts are there in the cycles `at`, and which takes the link for so many. `joins`: its first part
+  /// goes with the last one of the item before it, beside which it takes the link. Returns the cycles in which it is taken.
+  CycleInterval send(const Item& item, CycleInterval at, unsigned beats = 1, bool joins = false) {
     if (this->limited_) at = limited(at, beats);
     ++this->transferred_;
-    at = direct_ != nullptr ? direct_->offer(item, at, beats, this->pipeline_) : call(item, at, beats);
+    at = direct_ != nullptr ? direct_->offer(item, at, beats, joins, this->pipeline_) : call(item, at, beats, joins);
     last_ = at.last;
     return at;
   }
@@ -210,13 +216,14 @@ class TimedOut : public OutEnd<Item> {
   using OutEnd<Item>::clock_;
 
   /// Through the socket; returns when it is taken.
-  CycleInterval call(const Item& item, CycleInterval at, unsigned beats) {
+  CycleInterval call(const Item& item, CycleInterval at, unsigned beats, bool joins) {
     StreamPayload<Item> payload;
     payload.item = &item;
     payload.latency = this->pipeline_;
     payload.at = at.first;
     payload.last = at.last;
     payload.beats = beats;
+    payload.joins = joins;
     sc_core::sc_time delay;
     this->socket->b_transport(payload, delay);
     return {payload.at, payload.last};
@@ -292,14 +299,22 @@ class TimedIn : public InEnd<Item> {
   }
 
   void b_transport(StreamPayload<Item>& payload, sc_core::sc_time&) override {
-    const CycleInterval taken = offer(*payload.item, {payload.at, payload.last}, payload.beats, payload.latency);
+    const CycleInterval taken =
+        offer(*payload.item, {payload.at, payload.last}, payload.beats, payload.joins, payload.latency);
     payload.at = taken.first;
     payload.last = taken.last;
   }
   /// Takes an item; returns when.
-  CycleInterval offer(const Item& item, CycleInterval at, unsigned beats, Cycle pipeline) {
+  CycleInterval offer(const Item& item, CycleInterval at, unsigned beats, bool joins, Cycle pipeline) {
     std::size_t place = place_;
-    if (free_at_[place] > at.first) {
+    if (beats == 0) {
+      Cycle& free_at = free_at_[place == 0 ? depth_ - 1 : place - 1];
+      free_at = std::max(free_at, handler_(item, visible(at, pipeline)).last + 1);
+      return at;
+    }
+    if (joins) {
+      at.last = std::max(at.last, free_at_[place]);
+    } else if (free_at_[place] > at.first) {
       at.last += free_at_[place] - at.first;
       at.first = free_at_[place];
     }
@@ -308,8 +323,8 @@ class TimedIn : public InEnd<Item> {
       free_at_[place] = handler_(item, visible(at, pipeline)).last + 1;
       return at;
     }
-    // Parts that the queue has no place for at first follow when the item's own first parts have left.
-    std::size_t last_place = place + std::min(beats, depth_) - 1;
+    if (beats > depth_) return offer_in_rounds(item, at, beats, pipeline);
+    std::size_t last_place = place + beats - 1;
     if (last_place >= depth_) last_place -= depth_;
     at.last = std::max(at.last, free_at_[last_place]);
     const CycleInterval left = handler_(item, visible(at, pipeline));
@@ -319,7 +334,26 @@ class TimedIn : public InEnd<Item> {
       place = place + 1 == depth_ ? 0 : place + 1;
     }
     place_ = place;
-    if (beats > depth_) at.last = std::max(at.last, left.of_part(beats - depth_ - 1, beats) + 1);
+    return at;
+  }
+  /// Parts that the queue has no place for at first follow when the item's own first parts have left: at best at once.
+  [[gnu::noinline]] CycleInterval offer_in_rounds(const Item& item, CycleInterval at, unsigned beats, Cycle pipeline) {
+    const CycleInterval offered = at;
+    const std::size_t first = place_;
+    Cycle last = at.first;
+    for (unsigned beat = 0; beat < beats; ++beat) {
+      last = std::max({last, offered.of_part(beat, beats), free_at_[place_]});
+      free_at_[place_] = last + latency_ + pipeline + 1;
+      place_ = place_ + 1 == depth_ ? 0 : place_ + 1;
+    }
+    at.last = last;
+    const CycleInterval left = handler_(item, visible(at, pipeline));
+    std::size_t place = first;
+    for (unsigned beat = 0; beat < beats; ++beat) {
+      free_at_[place] = std::max(free_at_[place], left.of_part(beat, beats) + 1);
+      place = place + 1 == depth_ ? 0 : place + 1;
+    }
+    at.last = std::max(at.last, left.of_part(beats - depth_ - 1, beats) + 1);
     return at;
   }
 

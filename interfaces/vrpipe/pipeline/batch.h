@@ -17,6 +17,7 @@ struct BinItem {
   BinStorage* storage = nullptr;  ///< its first `quads` quads; the test takes the dead ones out
   TileId tile;
   std::uint32_t quads = 0;
+  std::uint32_t beats = 1;  ///< of quads, as it moves at cycle
   Mark mark = Mark::none;
   bool last_part = true;  ///< closes the bin; what runs ahead of time has a bin in parts
 };

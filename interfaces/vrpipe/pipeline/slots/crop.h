@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <vrpipe/memory/cache_statistics.h>
+#include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/memory/sectors.h>
 #include <vrpipe/pipeline/framebuffer.h>
 #include <vrpipe/pipeline/quad_sectors.h>
@@ -57,6 +58,9 @@ class CropBehaviour : public Behaviour {
   /// order alone, so that which sectors move does not depend on when; for timing models that do not follow fills through the
   /// cache themselves. Without a cache, no line is needed.
   virtual void look_up(const ShadedWarp&, unsigned /*from*/, unsigned /*to*/, CacheLookUp& out) { out.count = 0; }
+  /// The colour cache of `look_up`, for models that pin lines of quads between their look-up and their blend, and look up quad
+  /// by quad then. None: whatever is looked up is there.
+  virtual SectoredCache* cache() { return nullptr; }
   /// After a `blend` whose sectors are dirty for it.
   virtual void make_dirty(std::uint32_t /*line*/, std::uint32_t /*sectors*/) {}
   /// What its work takes: the parameters of its timing models (modules/crop/crop_time.h).
