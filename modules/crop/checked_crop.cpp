@@ -43,9 +43,11 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
       if (out.lines[i].line >= held) fault("look_up", "line {} of a cache of {}", out.lines[i].line, held);
     }
     for (unsigned i = from; out.count > 0 && i < to; ++i) {
-      if (out.line_of[i] >= out.count) fault("look_up", "quad {} needs line {} of {}", i, out.line_of[i], out.count);
+      const QuadSectors& quad = time().sectors_of_quads()[warp.position[i]];
+      const unsigned place = out.place_of[quad.line];
+      if (place >= out.count) fault("look_up", "quad {} needs line {} of {}", i, place, out.count);
       ++line_accesses_;
-      sector_accesses_ += bits(out.sectors_of[i]);
+      sector_accesses_ += bits(quad.sectors);
     }
     for (unsigned i = 0; i < out.count; ++i) {
       line_misses_ += out.lines[i].replaced ? 1 : 0;

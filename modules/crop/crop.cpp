@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -99,29 +100,23 @@ template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) {
   if (!cache_) cache();
   const std::uint64_t tile = surface_->address(warp.tile, 0);
-  // Where a line of the tile is in `out.lines`, if it is there. Without branches, which would be mispredicted.
-  std::array<std::uint8_t, positions_per_tile> place_of{};
-  std::array<std::uint8_t, quads_per_warp> line_at;
-  std::array<std::uint32_t, quads_per_warp> sectors_at{};
+  // Without branches on whether a line is new, which would be mispredicted.
+  std::array<std::uint8_t, quads_per_warp> needed;
   std::uint64_t seen = 0;
   unsigned count = 0;
   for (unsigned i = from; i < to; ++i) {
-    const auto [line, sectors] = time_.sectors_of_quads()[warp.position[i]];
-    const bool is_new = (seen >> line & 1U) == 0;
-    seen |= std::uint64_t{1} << line;
-    const unsigned if_new = 0U - static_cast<unsigned>(is_new);
-    const unsigned place = place_of[line] | (count & if_new);
-    place_of[line] = static_cast<std::uint8_t>(place);
-    line_at[place] = static_cast<std::uint8_t>(line);
-    sectors_at[place] |= sectors;
-    count -= if_new;
-    out.line_of[i] = static_cast<std::uint8_t>(place);
-    out.sectors_of[i] = sectors;
+    const QuadSectors& quad = time_.sectors_of_quads()[warp.position[i]];
+    needed[count] = static_cast<std::uint8_t>(quad.line);
+    count += (seen >> quad.line & 1U) == 0;
+    seen |= std::uint64_t{1} << quad.line;
+    sectors_needed_[quad.line] |= quad.sectors;
   }
   out.count = count;
   for (unsigned place = 0; place < count; ++place) {
-    out.lines[place].address = tile + std::uint64_t{line_at[place]} * time_.cache.line_bytes;
-    out.lines[place].sectors = sectors_at[place];
+    const unsigned line = needed[place];
+    out.place_of[line] = static_cast<std::uint8_t>(place);
+    out.lines[place].address = tile + std::uint64_t{line} * time_.cache.line_bytes;
+    out.lines[place].sectors = std::exchange(sectors_needed_[line], 0);
     if (replaces_) out.lines[place].known = context_.state(warp.draw[from]).blend ? 0 : ~0U;  // all quads' state
     cache_->look_up(out.lines[place]);
   }
@@ -137,10 +132,12 @@ void ColorRop<Format, Rounding>::count_anomalies(std::size_t place, LaneMask liv
   QuadColor destination;
   store({red_green, blue_alpha}, destination);
   const LaneBits lanes = expand_mask(live);
-  const QuadColor sum = blend_front_to_back(destination, color);
-  const LaneBits saturated =
-      lanes & ((sum.red > largest_color) | (sum.green > largest_color) | (sum.blue > largest_color));
-  colors_saturated += popcount(sign_mask(saturated));
+  if (watches_saturation_) {
+    const QuadColor sum = blend_front_to_back(destination, color);
+    const LaneBits saturated =
+        lanes & ((sum.red > largest_color) | (sum.green > largest_color) | (sum.blue > largest_color));
+    colors_saturated += popcount(sign_mask(saturated));
+  }
 
   const LaneBits lost = lanes & (stored.alpha == destination.alpha) & ~passes(stored.alpha);
   if (sign_mask(lost) == 0) return;
@@ -244,22 +241,33 @@ void ColorRop<Format, Rounding>::tell(std::size_t place, LaneMask live) const {
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
-CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(DrawIndex draw, std::size_t place, LaneMask live,
-                                                         const QuadColor& color) {
-  if (draw != draw_) set_draw(draw);
-  if (context_.fragments != nullptr) tell(place, live);
+template <typename ColorRop<Format, Rounding>::Way How>
+[[gnu::always_inline]] inline CropBehaviour::Outcome ColorRop<Format, Rounding>::blend_one(std::size_t place,
+                                                                                           LaneMask live,
+                                                                                           const QuadColor& color) {
   Tally tally;
-  QuadColor& quad = surface_->quad(place);
-  const Outcome outcome = way_ == Way::plain    ? blend_into<Way::plain>(quad, place, live, color, tally)
-                          : way_ == Way::asking ? blend_into<Way::asking>(quad, place, live, color, tally)
-                                                : replace(quad, place, live, color, tally);
-  count(draw, tally);
+  const Outcome outcome = blend_into<How>(surface_->quad(place), place, live, color, tally);
+  count(draw_, tally);
   return outcome;
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
+CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(DrawIndex draw, std::size_t place, LaneMask live,
+                                                         const QuadColor& color) {
+  if (draw != draw_) set_draw(draw);
+  if (context_.fragments != nullptr) tell(place, live);
+  switch (way_) {
+    case Way::plain: return blend_one<Way::plain>(place, live, color);
+    case Way::asking: return blend_one<Way::asking>(place, live, color);
+    case Way::replacing: break;
+  }
+  return blend_one<Way::replacing>(place, live, color);
+}
+
+template <ColorFormat Format, BlendRounding Rounding>
 template <typename ColorRop<Format, Rounding>::Way How>
-void ColorRop<Format, Rounding>::blend_run(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) {
+[[gnu::always_inline]] inline void ColorRop<Format, Rounding>::blend_run(const ShadedWarp& warp, unsigned from,
+                                                                         unsigned to, Outcomes& outcomes) {
   const std::size_t tile = surface_->grid().place(warp.tile, 0);
   QuadColor* const quads = &surface_->quad(tile);
   Tally tally;

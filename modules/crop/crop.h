@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <limits>
 #include <optional>
 #include <vector>
@@ -67,6 +68,8 @@ class ColorRop : public CropBehaviour {
   Outcome blend_into(QuadColor& destination, std::size_t place, LaneMask live, const QuadColor& color, Tally& tally);
   Outcome replace(QuadColor& destination, std::size_t place, LaneMask live, const QuadColor& color, Tally& tally);
   template <Way>
+  Outcome blend_one(std::size_t place, LaneMask live, const QuadColor& color);
+  template <Way>
   void blend_run(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes);
   LaneBits passes(Lanes alpha) const { return alpha >= threshold_; }
   /// After a blend of `color` into a quad that held the channels given.
@@ -94,6 +97,8 @@ class ColorRop : public CropBehaviour {
   std::vector<Lanes> lost_to_rounding_;
   const bool checks_previous_;
   const CropTime time_;
+  /// By line of a screen tile, in a look-up; none after it.
+  std::array<std::uint32_t, positions_per_tile> sectors_needed_{};
   std::optional<SectoredCache> cache_;  ///< once looked up here; the timing model of `cycle` has one of its own
 };
 

@@ -80,11 +80,11 @@ unsigned CropTime::flits_of_reads(const ShadedWarp& warp, unsigned from, unsigne
   for (unsigned line = 0; line < looked_up.count; ++line) lacking[line] = looked_up.lines[line].filled;
   unsigned flits = 0;
   for (unsigned i = from; i < to; ++i) {
-    const unsigned line = looked_up.line_of[i];
-    if ((lacking[line] & looked_up.sectors_of[i]) == 0) continue;
-    lacking[line] &= ~looked_up.sectors_of[i];
-    const std::uint64_t offset = looked_up.lines[line].address - surface.address(tile);
-    flits += flits_of_read(tile, warp.first_primitive[i], static_cast<unsigned>(offset / cache.line_bytes));
+    const QuadSectors& quad = sectors_of_quads_[warp.position[i]];
+    std::uint32_t& left = lacking[looked_up.place_of[quad.line]];
+    if ((left & quad.sectors) == 0) continue;
+    left &= ~quad.sectors;
+    flits += flits_of_read(tile, warp.first_primitive[i], quad.line);
   }
   return flits;
 }

@@ -88,11 +88,11 @@ class TimedCrop : public TimedUnit {
       behaviour_->pass(warp.mark);
       if (barriers_.is_barrier(warp.mark)) out_done_.send({warp.mark}, std::max(visible.first, time_.last_blend()));
     } else if (at_once_ >= warp.count) {
-      left = pass(warp, 0, warp.count, visible);
+      left = at_once_ > 1 ? pass<true>(warp, 0, warp.count, visible) : pass<false>(warp, 0, warp.count, visible);
     } else {
       left.first = never;
       for (unsigned i = 0; i < warp.count; ++i) {
-        const CycleInterval at = pass(warp, i, i + 1, visible.of_part(i, warp.count));
+        const CycleInterval at = pass<false>(warp, i, i + 1, visible.of_part(i, warp.count));
         left.first = std::min(left.first, at.first);
         left.last = at.last;
       }
@@ -101,8 +101,11 @@ class TimedCrop : public TimedUnit {
     return left;
   }
 
-  /// Looks quads of a warp up and blends them; returns the cycles of the look-ups.
+  /// Looks quads of a warp up and blends them; returns the cycles of the look-ups. Where it is taken whole, there are no second
+  /// looks.
+  template <bool Whole>
   CycleInterval pass(const ShadedWarp& warp, unsigned from, unsigned to, CycleInterval visible) {
+    const bool fetches_ahead = !Whole && time_.fetches_ahead();
     const unsigned quads = to - from;
     const ColorSurface& surface = *behaviour_->surface();
     const std::size_t tile = surface.grid().place(warp.tile, 0);
@@ -113,12 +116,12 @@ class TimedCrop : public TimedUnit {
       monitor_->prefetch(place);
     }
     // Places in the queue, and lines that no queued quad needs.
-    SlotPool& places = time_.fetches_ahead() ? ahead_ : queue_;
+    SlotPool& places = fetches_ahead ? ahead_ : queue_;
     Cycle at = places.free_from(visible.first, 1);
     const Cycle has_places = places.free_from(std::max(at, visible.last), quads);
     if (pins_ != nullptr) at = line_free_from(warp, from, at);
     behaviour_->look_up(warp, from, to, cache_);
-    for (unsigned line = 0; line < cache_.count && !time_.fetches_ahead(); ++line) {
+    for (unsigned line = 0; line < cache_.count && !fetches_ahead; ++line) {
       if (cache_.lines[line].replaced) at = std::max(at, stays_[cache_.lines[line].line].last_blend);
     }
     CycleInterval looked_up = look_ups_.take(port_open_from(at), quads);
@@ -126,9 +129,9 @@ class TimedCrop : public TimedUnit {
     Cycle there = looked_up.first + 1;
     Cycle asked = looked_up.first;
     for (unsigned line = 0, i = from; line < cache_.count; ++line) {
-      while (cache_.line_of[i] != line) ++i;  // the first that needs it
+      while (cache_.place_of[sectors_of(warp, i).line] != line) ++i;  // the first that needs it
       asked = std::max(asked, looked_up.of_part(i - from, quads));
-      there = std::max(there, move(cache_.lines[line], asked));
+      there = std::max(there, move(cache_.lines[line], fetches_ahead, asked));
     }
     looked_up.last = std::max(looked_up.last, asked);
     look_ups_.hold(looked_up.last);
@@ -139,7 +142,7 @@ class TimedCrop : public TimedUnit {
       moves_.push({looked_up.last, moved});
     }
 
-    if (time_.fetches_ahead()) there = std::max(there, look_again(warp, from, looked_up.last));
+    if (fetches_ahead) there = std::max(there, look_again(warp, from, looked_up.last));
 
     charge(UnitState::starved, looked_up.first + 1);
     if (const Cycle room = std::max(out_.last(), out_.room_from()); room > there) {
@@ -158,7 +161,7 @@ class TimedCrop : public TimedUnit {
     any_blended_ = true;
     quads_last(blended.last + time_.latency_cycles, quads, [&](unsigned i) { return warp.draw[from + i]; });
     did(CropWork::blend, quads, blended.first, blended.last + 1);
-    blend(warp, from, to, blended);
+    blend(warp, from, to, fetches_ahead, blended);
     return looked_up;
   }
 
@@ -178,7 +181,7 @@ class TimedCrop : public TimedUnit {
   }
 
   /// Takes the time of quads whose sectors are there from a cycle on.
-  CycleInterval blend_in_turn(const ShadedWarp& warp, unsigned from, unsigned to, Cycle there) {
+  [[gnu::always_inline]] CycleInterval blend_in_turn(const ShadedWarp& warp, unsigned from, unsigned to, Cycle there) {
     // What moves takes time from blending, from when it does.
     for (; !moves_.empty() && moves_.front().at <= time_.free_from(time_.price(), there); moves_.pop()) {
       const Move& move = moves_.front();
@@ -201,8 +204,12 @@ class TimedCrop : public TimedUnit {
     }
     return blended;
   }
+  const QuadSectors& sectors_of(const ShadedWarp& warp, unsigned index) const {
+    return time_.sectors_of_quads()[warp.position[index]];
+  }
   CropTime::Quad priced_quad(const ShadedWarp& warp, unsigned index) const {
-    return {cache_.lines[cache_.line_of[index]].address, cache_.sectors_of[index],
+    const QuadSectors& sectors = sectors_of(warp, index);
+    return {cache_.line_of(sectors).address, sectors.sectors,
             behaviour_->surface()->grid().place(warp.tile, warp.position[index]), warp.live[index],
             context_.state(warp.draw[index]).blend};
   }
@@ -236,11 +243,11 @@ class TimedCrop : public TimedUnit {
   }
 
   /// Moves what a look-up says of a line; returns when its sectors are there.
-  Cycle move(const CropBehaviour::LineAccess& access, Cycle& at) {
+  Cycle move(const CropBehaviour::LineAccess& access, bool fetches_ahead, Cycle& at) {
     Stay& stay = stays_[access.line];
     if (access.written_back != 0) {
       // Where tags run ahead, quads may still be blended into what the line held.
-      const Cycle from = time_.fetches_ahead() ? std::max(at, stay.last_blend) : at;
+      const Cycle from = fetches_ahead ? std::max(at, stay.last_blend) : at;
       memory_.write_back(access, from);
       CropTime::Moves moves;
       moves.write(static_cast<unsigned>(__builtin_popcount(access.written_back)));
@@ -251,7 +258,7 @@ class TimedCrop : public TimedUnit {
       }
     }
     // What replaces colours does not read them.
-    if (time_.fetches_ahead() && access.replaced) uses_of(access).come(at, access.filled != 0);
+    if (fetches_ahead && access.replaced) uses_of(access).come(at, access.filled != 0);
     return access.filled == 0 ? 0 : memory_.fill(access, at);
   }
   TimedLineUses& uses_of(const LineAccess& line) {
@@ -260,8 +267,8 @@ class TimedCrop : public TimedUnit {
 
   /// The second look at the tag of a quad, as LinesAhead's; returns when its sectors are there.
   [[gnu::noinline]] Cycle look_again(const ShadedWarp& warp, unsigned index, Cycle looked_up) {
-    const CropBehaviour::LineAccess& line = cache_.lines[cache_.line_of[index]];
-    const std::uint32_t sectors = cache_.sectors_of[index];
+    const auto& [line_of_tile, sectors] = sectors_of(warp, index);
+    const CropBehaviour::LineAccess& line = cache_.lines[cache_.place_of[line_of_tile]];
     const LineVisits::Visit visit =
         visits_.of(behaviour_->surface()->grid().place(warp.tile, 0), warp.first_primitive[index]);
     Cycle at = second_looks_.take(queue_.free_from(looked_up, 1), 1).first;
@@ -280,23 +287,32 @@ class TimedCrop : public TimedUnit {
     return std::max(there, at);
   }
 
-  void blend(const ShadedWarp& warp, unsigned from, unsigned to, CycleInterval at) {
+  [[gnu::always_inline]] void blend(const ShadedWarp& warp, unsigned from, unsigned to, bool fetches_ahead,
+                                    CycleInterval at) {
     monitor_->blended(warp, from, to, at.last);
     CropBehaviour::Outcomes outcomes;
     behaviour_->blend_quads(warp, from, to, outcomes);
-    std::array<std::uint32_t, quads_per_warp> dirty{};  // by line
     unsigned terminated = 0;
+    bool all_changed = true;
     for (unsigned i = from; i < to; ++i) {
-      const bool changed = outcomes[i].changed || time_.writes_unchanged;
-      dirty[cache_.line_of[i]] |= changed ? cache_.sectors_of[i] : 0U;
       terminated |= outcomes[i].terminated;
+      all_changed &= outcomes[i].changed;
     }
     if (terminated != 0) signal(warp, from, to, outcomes, at);
+    std::array<std::uint32_t, quads_per_warp> dirty{};  // by line
+    if (all_changed || time_.writes_unchanged) {
+      for (unsigned line = 0; line < cache_.count; ++line) dirty[line] = cache_.lines[line].sectors;
+    } else {
+      for (unsigned i = from; i < to; ++i) {
+        const QuadSectors& quad = sectors_of(warp, i);
+        dirty[cache_.place_of[quad.line]] |= outcomes[i].changed ? quad.sectors : 0U;
+      }
+    }
     for (unsigned i = 0; i < cache_.count; ++i) {
       const std::uint32_t line = cache_.lines[i].line;
       stays_[line].last_blend = at.last;
-      if (time_.fetches_ahead())
-        uses_of(cache_.lines[i]).used(cache_.sectors_of[from], time_.cache.sectors_of_a_half(), at.last);
+      if (fetches_ahead)
+        uses_of(cache_.lines[i]).used(sectors_of(warp, from).sectors, time_.cache.sectors_of_a_half(), at.last);
       if (dirty[i] == 0) continue;
       behaviour_->make_dirty(line, dirty[i]);
       if (time_.port.is_on()) owe(stays_[line], dirty[i]);

@@ -40,12 +40,10 @@ class UntimedCrop : public UntimedUnit {
     const ColorSurface& surface = *behaviour_->surface();
     const std::size_t tile = surface.grid().place(warp.tile, 0);
     const QuadColor* const quads = &surface.quad(tile);
+    for (unsigned i = 0; i < warp.count; ++i) __builtin_prefetch(&quads[warp.quads[i].position], 1);
+    constexpr unsigned in_a_line = 16;  // of a host's cache
     const BlendOrderMonitor& monitor = watch();
-    for (unsigned i = 0; i < warp.count; ++i) {
-      const unsigned position = warp.quads[i].position;
-      __builtin_prefetch(&quads[position], 1);
-      monitor.prefetch(tile + position);
-    }
+    for (unsigned position = 0; position < positions_per_tile; position += in_a_line) monitor.prefetch(tile + position);
   }
 
   void count_least(const BoundTerms& terms) override {
@@ -133,7 +131,8 @@ class UntimedCrop : public UntimedUnit {
   void account(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome) {
     const bool changed = outcome.changed || time_.writes_unchanged;
     if (cache_.count > 0 && changed) {
-      behaviour_->make_dirty(cache_.lines[cache_.line_of[index]].line, cache_.sectors_of[index]);
+      const QuadSectors& quad = time_.sectors_of_quads()[warp.position[index]];
+      behaviour_->make_dirty(cache_.line_of(quad).line, quad.sectors);
     }
     if (counts_) count(warp, index, outcome);
   }

@@ -101,8 +101,13 @@ class TimedProp : public TimedUnit {
   /// Lets those warps leave whose turn has come and whose way is free before a cycle.
   void leave_until(Cycle until) {
     do {
-      while (order_.has_next() && way_is_free_from() < until) leave(order_.take());
+      while (order_.has_next() && way_is_free_before(until)) leave(order_.take());
     } while (pass_mark());
+  }
+  /// As way_is_free_from() < until, of which the first term tells most often.
+  bool way_is_free_before(Cycle until) const {
+    return color_.next() < until && out_color_.last() < until && out_color_.room_from() < until &&
+           out_release_.room_from() < until;
   }
   /// For another warp, which begins to leave once its release has room.
   Cycle way_is_free_from() const {

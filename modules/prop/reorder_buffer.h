@@ -35,7 +35,7 @@ class ReorderBuffer {
         grid_(context.frame->width(), context.frame->height()),
         next_of_line_(by_draw_ ? 1 : grid_.tiles()) {}
 
-  void arrive(const ShadedWarp& warp, Cycle from = 0) {
+  [[gnu::always_inline]] void arrive(const ShadedWarp& warp, Cycle from = 0) {
     const Turn turn = turn_of(warp);
     const Waiting waiting{&warp, warp.sequence, turn, from};
     if (!marks_.empty() && warp.sequence >= marks_.front().warp->sequence) {
@@ -61,7 +61,7 @@ class ReorderBuffer {
   bool has_next() const { return !in_turn_.empty(); }
   Waiting take() { return in_turn_.take_oldest(); }
   /// The warp of a turn has left: the one that follows it may be among those that came early.
-  void leave(Turn turn, Cycle at = 0) {
+  [[gnu::always_inline]] void leave(Turn turn, Cycle at = 0) {
     next_of_line_[turn.line] = ++turn.number;
     ++left_;
     Waiting waiting;

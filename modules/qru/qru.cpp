@@ -113,6 +113,15 @@ void QruPassThrough::launch(Warp& out) {
 }
 
 unsigned QruPassThrough::examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) {
+  if (warp_.count == 0 && count >= quads_per_warp) {  // as most often
+    out.tile = tile;
+    out.count = quads_per_warp;
+    out.merge_pairs = 0;
+    out.mark = Mark::none;
+    std::copy_n(quads, quads_per_warp, out.quads.begin());
+    launched = true;
+    return quads_per_warp;
+  }
   warp_.tile = tile;
   const unsigned examined = append(warp_, quads, count);
   launched = warp_.count == quads_per_warp;

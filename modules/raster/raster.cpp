@@ -120,11 +120,10 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   }
   tile_x_begin_ = area_.x0 / tile_side;
   tile_x_end_ = (area_.x1 - 1) / tile_side + 1;
-  tile_y_ = area_.y0 / tile_side;
-  tile_y_end_ = area_.empty() ? tile_y_ : (area_.y1 - 1) / tile_side + 1;
-  tile_x_ = tile_x_begin_;
-  part_ = 0;
-  tile_counted_ = false;
+  next_x_ = tile_x_begin_;
+  next_y_ = area_.y0 / tile_side;
+  tile_y_end_ = area_.empty() ? next_y_ : (area_.y1 - 1) / tile_side + 1;
+  left_ = kept_ = 0;
 
   tests_hi_z_ = hi_z_ != nullptr && hi_z_->begin(primitive);
   if (draws_rectangles(context_.draw(primitive.draw))) return set_up_rectangle();
@@ -140,54 +139,95 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   const std::int64_t half = step / 2;
   wide_ = false;
   std::int64_t magnitudes = 1;  // the bits of all of them together are those of the largest
+  OfEdges dx{};
+  OfEdges dy{};
+  OfEdges at_first{};
   for (unsigned i = 0; i < 3; ++i) {
     const unsigned j = (i + 1) % 3;
     // Positive inside, y down: E(x, y) = (xj - xi)(y - yi) - (yj - yi)(x - xi).
     const std::int64_t across = std::int64_t{t.x[j]} - t.x[i];
     const std::int64_t down = std::int64_t{t.y[j]} - t.y[i];
-    Edge& edge = edges_[i];
-    edge.dx = -down * step;
-    edge.dy = across * step;
+    const std::int64_t to_the_right = -down * step;
+    const std::int64_t to_below = across * step;
     // A sample on an edge belongs to the triangle if the edge is a top edge (horizontal, inside below it) or a left
     // edge (inside to its right); on any other edge it does not, which one less says in integers.
     const bool top_left = (down == 0 && across > 0) || down < 0;
-    edge.origin = across * (half - t.y[i]) - down * (half - t.x[i]) - (top_left ? 0 : 1);
-    if (std::abs(edge.dx) + std::abs(edge.dy) > narrow_gradient) wide_ = true;
-    edge.set_up_tile();
-    magnitudes |= std::abs(edge.origin) + std::abs(edge.dx) * width + std::abs(edge.dy) * height;
+    const std::int64_t origin = across * (half - t.y[i]) - down * (half - t.x[i]) - (top_left ? 0 : 1);
+    if (std::abs(to_the_right) + std::abs(to_below) > narrow_gradient) wide_ = true;
+    magnitudes |= std::abs(origin) + std::abs(to_the_right) * width + std::abs(to_below) * height;
+    dx[i] = to_the_right;
+    dy[i] = to_below;
+    at_first[i] = origin + to_the_right * (tile_x_begin_ * tile_side) + to_below * (next_y_ * tile_side);
   }
+  at_next_ = at_row_ = at_first;
+  set_up_tiles(dx, dy);
   if (wide_ && !wide_edges_gate_.enter()) wide_ = false;
   if (wide_) ++wide_edges;
   widest_edge.see(static_cast<std::uint64_t>(65 - __builtin_clzll(static_cast<unsigned long long>(magnitudes))));
 }
 
-void TileRasterizer::Edge::set_up_tile() {
+void TileRasterizer::set_up_tiles(const OfEdges& dx, const OfEdges& dy) {
+  dx_ = dx;
+  dy_ = dy;
+  right_ = dx * tile_side;
+  below_ = dy * tile_side;
   // The largest value over a tile's samples is at the corner to which the gradient points.
-  reach = (raster_side - 1) * (std::max<std::int64_t>(dx, 0) + std::max<std::int64_t>(dy, 0));
-  // Of edges that are too wide, which are filled by these only if that effect was left out by force, the low bits.
-  const auto across = static_cast<std::int32_t>(dx);
-  const auto down = static_cast<std::int32_t>(dy);
-  samples = across * LanePairBits{0, 1, 0, 1, 0, 1, 0, 1} + down * LanePairBits{0, 0, 1, 1, 2, 2, 3, 3};
-  right = LanePairBits{} + static_cast<std::int32_t>(2 * dx);
-  below = LanePairBits{} + static_cast<std::int32_t>(4 * dy);
+  const OfEdges reach = (raster_side - 1) * ((dx & (dx > 0)) + (dy & (dy > 0)));
+  for (unsigned part = 0; part < 4; ++part) {
+    at_part_[part] = raster_side * (((part & 1U) != 0 ? dx : OfEdges{}) + ((part & 2U) != 0 ? dy : OfEdges{}));
+    most_in_part_[part] = at_part_[part] + reach;
+  }
+  for (unsigned i = 0; i < 3; ++i) {
+    // Of edges that are too wide, which are filled by these only if that effect was left out by force, the low bits.
+    const auto across = static_cast<std::int32_t>(dx[i]);
+    const auto down = static_cast<std::int32_t>(dy[i]);
+    Fill& fill = fill_[i];
+    fill.samples = across * LanePairBits{0, 1, 0, 1, 0, 1, 0, 1} + down * LanePairBits{0, 0, 1, 1, 2, 2, 3, 3};
+    fill.right = LanePairBits{} + static_cast<std::int32_t>(2 * dx[i]);
+    fill.below = LanePairBits{} + static_cast<std::int32_t>(4 * dy[i]);
+  }
 }
 
 /// It covers its bounds: edges that have no sample outside, and all beyond the bounds masked off.
 void TileRasterizer::set_up_rectangle() {
-  for (Edge& edge : edges_) edge = {};
   wide_ = false;
+  at_next_ = at_row_ = OfEdges{};
+  set_up_tiles(OfEdges{}, OfEdges{});
   mask_area_ = area_;
 }
 
-bool TileRasterizer::advance() {
-  if (++part_ < 4) return true;
-  part_ = 0;
-  tile_counted_ = false;
-  if (++tile_x_ == tile_x_end_) {
-    tile_x_ = tile_x_begin_;
-    ++tile_y_;
+std::int32_t TileRasterizer::x_of(unsigned part) const {
+  return tile_.x * tile_side + static_cast<std::int32_t>(part & 1U) * raster_side;
+}
+std::int32_t TileRasterizer::y_of(unsigned part) const {
+  return tile_.y * tile_side + static_cast<std::int32_t>(part >> 1U) * raster_side;
+}
+
+inline bool TileRasterizer::enter_tile() {
+  while (next_y_ < tile_y_end_) {
+    tile_ = {static_cast<std::uint16_t>(next_x_), static_cast<std::uint16_t>(next_y_)};
+    at_tile_ = at_next_;
+    at_next_ += right_;
+    if (++next_x_ == tile_x_end_) {
+      next_x_ = tile_x_begin_;
+      ++next_y_;
+      at_next_ = at_row_ += below_;
+    }
+    if (shares_tiles_ && !context_.placement.owns(tile_)) continue;
+    const std::int32_t middle_x = x_of(1);
+    const std::int32_t middle_y = y_of(2);
+    // Some raster tile of it lies in the area.
+    left_ = ((middle_x > area_.x0 ? 0b0101U : 0U) | (middle_x < area_.x1 ? 0b1010U : 0U)) &
+            ((middle_y > area_.y0 ? 0b0011U : 0U) | (middle_y < area_.y1 ? 0b1100U : 0U));
+    kept_ = left_;
+    for (unsigned part = 0; part < 4; ++part) {
+      const bool is_outside = sign_mask(reinterpret_cast<Words>(at_tile_ + most_in_part_[part])) != 0;
+      kept_ &= ~(unsigned{is_outside} << part);
+    }
+    tile_counted_ = false;
+    return true;
   }
-  return tile_y_ < tile_y_end_;
+  return false;
 }
 
 void TileRasterizer::tell(const QuadBeat& made) const {
@@ -197,112 +237,8 @@ void TileRasterizer::tell(const QuadBeat& made) const {
   }
 }
 
-bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) {
-  coarse_tests = 0;
-  for (; tile_y_ < tile_y_end_; advance()) {
-    const std::int32_t x = tile_x_ * tile_side + static_cast<std::int32_t>(part_ & 1U) * raster_side;
-    const std::int32_t y = tile_y_ * tile_side + static_cast<std::int32_t>(part_ >> 1U) * raster_side;
-    if (x >= area_.x1 || y >= area_.y1 || x + raster_side <= area_.x0 || y + raster_side <= area_.y0) continue;
-    const TileId tile{static_cast<std::uint16_t>(tile_x_), static_cast<std::uint16_t>(tile_y_)};
-    if (shares_tiles_ && !context_.placement.owns(tile)) continue;
-    ++coarse_tests;
-    std::int64_t value[3];
-    std::int64_t most = 0;  // below 0 if that of any edge is
-    for (unsigned i = 0; i < 3; ++i) {
-      const Edge& edge = edges_[i];
-      value[i] = edge.origin + edge.dx * x + edge.dy * y;
-      most |= value[i] + edge.reach;
-    }
-    if (most < 0 || (tests_hi_z_ && is_hidden(tile, x, y))) continue;
-
-    out.tile = tile;
-    out.last_of_bin = false;
-    out.mark = Mark::none;
-    const std::uint64_t covered = (wide_ ? coverage_of_wide(value) : coverage_of_narrow(value)) & in_area(x, y);
-    const auto fragments = static_cast<unsigned>(__builtin_popcountll(covered));
-    put_quads(out, x, y, covered);
-    if (by_halves_) take_by_halves(out);
-    quads_rasterized.add(primitive_.draw, out.count);
-    fragments_rasterized.add(primitive_.draw, fragments);
-    if (context_.fragments != nullptr) tell(out);
-    raster_tiles_tested += coarse_tests;
-    ++raster_tiles_kept;
-    new_screen_tile = !tile_counted_;
-    if (new_screen_tile) ++screen_tile_pairs;
-    tile_counted_ = true;
-    advance();
-    return true;
-  }
-  raster_tiles_tested += coarse_tests;
-  return false;
-}
-
-void TileRasterizer::take_by_halves(QuadBeat& tile) {
-  const QuadBeat rows = tile;
-  unsigned taken = 0;
-  for (const unsigned half : {0U, 2U}) {
-    for (unsigned i = 0; i < rows.count; ++i) {
-      if ((rows.quads[i].position & 2U) == half) tile.quads[taken++] = rows.quads[i];
-    }
-  }
-}
-
-bool TileRasterizer::is_hidden(TileId tile, std::int32_t x, std::int32_t y) {
-  ++hi_z_tests;
-  const PixelRect area{std::max(x, area_.x0), std::max(y, area_.y0), std::min(x + raster_side, area_.x1),
-                       std::min(y + raster_side, area_.y1)};
-  const bool is_hidden = hi_z_->hides(tile, part_, area);
-  hi_z_culled += is_hidden ? 1 : 0;
-  return is_hidden;
-}
-
-std::uint64_t TileRasterizer::in_area(std::int32_t x, std::int32_t y) const {
-  if (x >= mask_area_.x0 && y >= mask_area_.y0 && x + raster_side <= mask_area_.x1 &&
-      y + raster_side <= mask_area_.y1) {
-    return ~std::uint64_t{0};
-  }
-  const auto up_to = [](std::int32_t line) { return static_cast<std::size_t>(std::clamp(line, 0, raster_side)); };
-  const auto& [columns, rows] = samples_below;
-  return columns[up_to(mask_area_.x1 - x)] & ~columns[up_to(mask_area_.x0 - x)] & rows[up_to(mask_area_.y1 - y)] &
-         ~rows[up_to(mask_area_.y0 - y)];
-}
-
-std::uint64_t TileRasterizer::coverage_of_narrow(const std::int64_t (&value)[3]) const {
-  // The quads of a column in two rows at a time. No edge function may be negative inside.
-  LanePairBits upper[3];
-  for (unsigned i = 0; i < 3; ++i) {
-    upper[i] = edges_[i].samples + static_cast<std::int32_t>(std::clamp(value[i], -narrow_limit, narrow_limit));
-  }
-  std::uint64_t outside = 0;
-  for (unsigned half = 0; half < 2; ++half) {
-    LanePairBits at[3];
-    for (unsigned i = 0; i < 3; ++i) at[i] = half == 0 ? upper[i] : upper[i] + edges_[i].below;
-    LanePairBits of_column[4];
-    for (LanePairBits& any : of_column) {
-      any = at[0] | at[1] | at[2];
-      for (unsigned i = 0; i < 3; ++i) at[i] += edges_[i].right;
-    }
-    outside |= std::uint64_t{sign_masks(of_column)} << (32 * half);
-  }
-  return ~outside;
-}
-
-std::uint64_t TileRasterizer::coverage_of_wide(const std::int64_t (&value)[3]) const {
-  std::uint64_t coverage = 0;
-  for (unsigned sample = 0; sample < 64; ++sample) {
-    const unsigned quad = sample / 4;
-    const unsigned x = 2 * (quad % 4) + sample % 2;
-    const unsigned y = 2 * (quad / 4) + sample / 2 % 2;
-    bool inside = true;
-    for (unsigned i = 0; i < 3; ++i) inside = inside && value[i] + edges_[i].dx * x + edges_[i].dy * y >= 0;
-    coverage |= std::uint64_t{inside} << sample;
-  }
-  return coverage;
-}
-
-void TileRasterizer::put_quads(QuadBeat& out, std::int32_t x, std::int32_t y, std::uint64_t coverage) const {
-  const unsigned first =
-      static_cast<unsigned>((y % tile_side) / 2 * static_cast<std::int32_t>(quads_per_tile_row) + (x % tile_side) / 2);
+inline void TileRasterizer::put_quads(QuadBeat& out, unsigned part, std::uint64_t coverage) const {
+  const unsigned first = 4 * quads_per_tile_row * (part >> 1U) + 4 * (part & 1U);
   const std::uint64_t upper_left = primitive_.splat | std::uint64_t{first} << position_shift |
                                    std::uint64_t{primitive_.triangle} << triangle_shift |
                                    std::uint64_t{primitive_.draw} << draw_shift;
@@ -315,6 +251,109 @@ void TileRasterizer::put_quads(QuadBeat& out, std::int32_t x, std::int32_t y, st
     quads += quads_per_tile_row * to_the_right;
   }
   out.count = static_cast<std::uint8_t>(count);
+}
+
+bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) {
+  coarse_tests = 0;
+  while (true) {
+    while (kept_ == 0) {
+      coarse_tests += popcount(static_cast<LaneMask>(left_));
+      left_ = 0;
+      if (enter_tile()) continue;
+      raster_tiles_tested += coarse_tests;
+      return false;
+    }
+    const auto part = static_cast<unsigned>(__builtin_ctz(kept_));
+    const unsigned up_to_part = (2U << part) - 1;
+    coarse_tests += popcount(static_cast<LaneMask>(left_ & up_to_part));
+    left_ &= ~up_to_part;
+    kept_ &= kept_ - 1;
+    if (tests_hi_z_ && is_hidden(part)) continue;
+
+    out.tile = tile_;
+    out.last_of_bin = false;
+    out.mark = Mark::none;
+    const OfEdges value = at_tile_ + at_part_[part];
+    const std::uint64_t covered = (wide_ ? coverage_of_wide(value) : coverage_of_narrow(value)) & in_area(part);
+    put_quads(out, part, covered);
+    if (by_halves_) take_by_halves(out);
+    quads_rasterized.add(primitive_.draw, out.count);
+    fragments_rasterized.add(primitive_.draw, static_cast<unsigned>(__builtin_popcountll(covered)));
+    if (context_.fragments != nullptr) tell(out);
+    raster_tiles_tested += coarse_tests;
+    ++raster_tiles_kept;
+    new_screen_tile = !tile_counted_;
+    if (new_screen_tile) ++screen_tile_pairs;
+    tile_counted_ = true;
+    return true;
+  }
+}
+
+void TileRasterizer::take_by_halves(QuadBeat& tile) {
+  const QuadBeat rows = tile;
+  unsigned taken = 0;
+  for (const unsigned half : {0U, 2U}) {
+    for (unsigned i = 0; i < rows.count; ++i) {
+      if ((rows.quads[i].position & 2U) == half) tile.quads[taken++] = rows.quads[i];
+    }
+  }
+}
+
+bool TileRasterizer::is_hidden(unsigned part) {
+  ++hi_z_tests;
+  const std::int32_t x = x_of(part);
+  const std::int32_t y = y_of(part);
+  const PixelRect area{std::max(x, area_.x0), std::max(y, area_.y0), std::min(x + raster_side, area_.x1),
+                       std::min(y + raster_side, area_.y1)};
+  const bool is_hidden = hi_z_->hides(tile_, part, area);
+  hi_z_culled += is_hidden ? 1 : 0;
+  return is_hidden;
+}
+
+inline std::uint64_t TileRasterizer::in_area(unsigned part) const {
+  const std::int32_t x = x_of(part);
+  const std::int32_t y = y_of(part);
+  if (x >= mask_area_.x0 && y >= mask_area_.y0 && x + raster_side <= mask_area_.x1 &&
+      y + raster_side <= mask_area_.y1) {
+    return ~std::uint64_t{0};
+  }
+  const auto up_to = [](std::int32_t line) { return static_cast<std::size_t>(std::clamp(line, 0, raster_side)); };
+  const auto& [columns, rows] = samples_below;
+  return columns[up_to(mask_area_.x1 - x)] & ~columns[up_to(mask_area_.x0 - x)] & rows[up_to(mask_area_.y1 - y)] &
+         ~rows[up_to(mask_area_.y0 - y)];
+}
+
+inline std::uint64_t TileRasterizer::coverage_of_narrow(const OfEdges& value) const {
+  // The quads of a column in two rows at a time. No edge function may be negative inside.
+  OfEdges at_first = value < narrow_limit ? value : OfEdges{} + narrow_limit;
+  at_first = at_first > -narrow_limit ? at_first : OfEdges{} - narrow_limit;
+  LanePairBits upper[3];
+  for (unsigned i = 0; i < 3; ++i) upper[i] = fill_[i].samples + static_cast<std::int32_t>(at_first[i]);
+  std::uint64_t outside = 0;
+  for (unsigned half = 0; half < 2; ++half) {
+    LanePairBits at[3];
+    for (unsigned i = 0; i < 3; ++i) at[i] = half == 0 ? upper[i] : upper[i] + fill_[i].below;
+    LanePairBits of_column[4];
+    for (LanePairBits& any : of_column) {
+      any = at[0] | at[1] | at[2];
+      for (unsigned i = 0; i < 3; ++i) at[i] += fill_[i].right;
+    }
+    outside |= std::uint64_t{sign_masks(of_column)} << (32 * half);
+  }
+  return ~outside;
+}
+
+std::uint64_t TileRasterizer::coverage_of_wide(const OfEdges& value) const {
+  std::uint64_t coverage = 0;
+  for (unsigned sample = 0; sample < 64; ++sample) {
+    const unsigned quad = sample / 4;
+    const unsigned x = 2 * (quad % 4) + sample % 2;
+    const unsigned y = 2 * (quad / 4) + sample / 2 % 2;
+    bool inside = true;
+    for (unsigned i = 0; i < 3; ++i) inside = inside && value[i] + dx_[i] * x + dy_[i] * y >= 0;
+    coverage |= std::uint64_t{inside} << sample;
+  }
+  return coverage;
 }
 
 namespace {

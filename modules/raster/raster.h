@@ -159,43 +159,59 @@ class TileRasterizer : public RasterBehaviour {
   Counter wide_edges{*this, "wide_edges", "primitives", "that need 64-bit edge functions inside a raster tile"};
 
  private:
-  struct Edge {
-    std::int64_t dx = 0, dy = 0;  ///< change of the edge function a pixel to the right and down
-    std::int64_t origin = 0;      ///< at the sample of pixel (0, 0), top-left rule included
-    // Of a raster tile, beyond its first sample:
-    std::int64_t reach = 0;  ///< the largest
-    LanePairBits samples{}, right{},
-        below{};  ///< in 32 bits: of the first column's upper quads; to the next column, the lower
-    void set_up_tile();
+  /// Of the three edges, a word each; the fourth has no sample outside.
+  using OfEdges = std::int64_t __attribute__((vector_size(sizeof(Words))));
+  /// Of an edge, what its function has beyond its value at a raster tile's first sample, in 32 bits.
+  struct Fill {
+    LanePairBits samples{};         ///< at those of the first column's upper quads
+    LanePairBits right{}, below{};  ///< from there to the next column, and to the lower quads
   };
+  /// @param dx, dy  change of the edge functions a pixel to the right and down
+  void set_up_tiles(const OfEdges& dx, const OfEdges& dy);
   /// Samples of a raster tile that are inside, 4 bits for each of its 4x4 quads: by the values at its first one.
-  std::uint64_t coverage_of_narrow(const std::int64_t (&value)[3]) const;
-  std::uint64_t coverage_of_wide(const std::int64_t (&value)[3]) const;
+  std::uint64_t coverage_of_narrow(const OfEdges& value) const;
+  std::uint64_t coverage_of_wide(const OfEdges& value) const;
   void set_up_rectangle();
   void tell(const QuadBeat& made) const;
-  /// Those of the raster tile that begins at a pixel that are not masked off.
-  std::uint64_t in_area(std::int32_t x, std::int32_t y) const;
+  /// Those of a raster tile of the screen tile that are not masked off.
+  std::uint64_t in_area(unsigned part) const;
   /// All quads of it that are covered.
-  void put_quads(QuadBeat& out, std::int32_t x, std::int32_t y, std::uint64_t coverage) const;
-  bool advance();
+  void put_quads(QuadBeat& out, unsigned part, std::uint64_t coverage) const;
+  /// Goes on to the next screen tile, and tests its raster tiles against the edges; false if there is none.
+  bool enter_tile();
   [[gnu::noinline]] static void take_by_halves(QuadBeat& tile);
-  /// Whether Hi-Z culls the raster tile that begins at a pixel.
-  [[gnu::noinline]] bool is_hidden(TileId tile, std::int32_t x, std::int32_t y);
+  /// Whether Hi-Z culls a raster tile of the screen tile.
+  [[gnu::noinline]] bool is_hidden(unsigned part);
+  /// Where a raster tile of the screen tile begins.
+  std::int32_t x_of(unsigned part) const;
+  std::int32_t y_of(unsigned part) const;
 
   const RenderContext& context_;
   TriangleSnapper snapper_;
   const RasterTime time_;
-  Edge edges_[3];
   bool wide_ = false;
+  OfEdges dx_{}, dy_{};           ///< where they are wide
+  OfEdges right_{};               ///< to the next screen tile
+  OfEdges below_{};               ///< and to the next row of them
+  OfEdges at_part_[4] = {};       ///< at a raster tile's first sample, from that of the screen tile
+  OfEdges most_in_part_[4] = {};  ///< at the sample where it is largest
+  Fill fill_[3];
   Primitive primitive_;
   PixelRect area_;           ///< bounds of the primitive within the clip
   PixelRect mask_area_;      ///< outside which samples are masked off
-  std::int32_t tile_x_ = 0;  ///< screen tile, in tiles
-  std::int32_t tile_y_ = 0;
+  std::int32_t next_x_ = 0;  ///< the screen tile to enter next, in tiles
+  std::int32_t next_y_ = 0;
   std::int32_t tile_x_begin_ = 0;
   std::int32_t tile_x_end_ = 0;
   std::int32_t tile_y_end_ = 0;
-  unsigned part_ = 0;  ///< raster tile in the screen tile, 0 to 3
+  OfEdges at_next_{};  ///< the edges at its first sample
+  OfEdges at_row_{};   ///< and at that of the first in its row
+  // The screen tile that was entered last:
+  TileId tile_;
+  OfEdges at_tile_{};
+  // Of its raster tiles 0 to 3, a bit each:
+  unsigned left_ = 0;  ///< to be tested, as far as `next` has not come to them
+  unsigned kept_ = 0;  ///< of these, not outside an edge
   bool tile_counted_ = false;
   std::unique_ptr<HiZ> hi_z_;  ///< where it can cull anything
   bool tests_hi_z_ = false;    ///< for the primitive

@@ -1,6 +1,7 @@
 #include "sm/sm.h"
 
 #include "sm/imitated_merging.h"
+#include "sm/live_quads.h"
 
 #include <algorithm>
 #include <cmath>
@@ -137,59 +138,101 @@ inline LanePair SplatShader::alpha_at(LanePair x, LanePair y, const Shape& splat
   return select(alpha > alpha_max, LanePair{} + alpha_max, alpha);
 }
 
-void SplatShader::shade(const Warp& warp, ShadedWarp& out) {
-  ++fragment_warps;
-  WarpColors colors;
-  const FragmentShader shader = context_.state(warp.quads[0].draw).shader;  // all quads' state
-  if (__builtin_expect(shader == FragmentShader::alpha_threshold, 0)) {
-    shade_by_alpha(warp, colors);
-  } else if (__builtin_expect(shader != FragmentShader::splat, 0)) {
-    shade_mesh(warp, colors);
-  } else {
-    switch (context_.precision.exponential) {
-      case Exponential::exact: shade_splats<Exponential::exact>(warp, colors); break;
-      case Exponential::ex2: shade_splats<Exponential::ex2>(warp, colors); break;
-      case Exponential::fp16: shade_splats<Exponential::fp16>(warp, colors); break;
-      case Exponential::table256: shade_splats<Exponential::table256>(warp, colors); break;
-      case Exponential::table16: shade_splats<Exponential::table16>(warp, colors); break;
+inline void SplatShader::count(const Warp& warp, const Threads& threads) {
+  fragments_of_back_quads += threads_in(threads.live & (threads.merged_quads * all_lanes));
+  // The threads of each draw, most often of one.
+  for (std::uint32_t left = ~0U >> (4 * (quads_per_warp - warp.count)); left != 0;) {
+    const DrawIndex draw = warp.quads[static_cast<unsigned>(__builtin_ctz(left)) / 4].draw;
+    const std::uint32_t of_draw = several_draws_ ? threads_of(warp, draw) : left;
+    const std::uint32_t covered = threads.covered & of_draw;
+    const std::uint32_t live = threads.live & of_draw;
+    const std::uint32_t quads = of_draw & 0x11111111U;  // a bit a quad
+    const std::uint32_t live_quads = (live | live >> 1U | live >> 2U | live >> 3U) & quads;
+    quads_shaded.add(draw, threads_in(quads));
+    fragments_shaded.add(draw, threads_in(covered));
+    quads_pruned.add(draw, threads_in(quads & ~live_quads));
+    fragments_pruned.add(draw, threads_in(covered & ~live));
+    if (threads.merged_quads != 0) {
+      quads_merged.add(draw, threads_in(threads.merged_quads & of_draw));
+      fragments_merged.add(draw, threads_in(threads.merged & of_draw));
     }
+    left &= ~of_draw;
   }
-  put_out(warp, colors, out);
 }
 
-void SplatShader::shade_mesh(const Warp& warp, WarpColors& colors) {
+void SplatShader::shade(const Warp& warp, ShadedWarp& out) {
+  ++fragment_warps;
+  out.tile = warp.tile;
+  out.sequence = warp.sequence;
+  out.tile_sequence = warp.tile_sequence;
+  out.mark = Mark::none;
+  const QuadLanes lanes(warp);
+  Threads threads;
+  threads.covered = lanes.covered();
+  if (warp.merge_pairs != 0 && pairing_gate_.enter()) {
+    shade_pairs(warp, threads, out);
+  } else {
+    LiveColors colors{out.color.data()};
+    shade_quads(warp, threads, colors);
+    lanes.put_live(threads.live, several_draws_, out);
+  }
+  if (__builtin_expect(context_.hands_on_coverage, 0)) add_pruned(warp, threads, out);
+  if (threads.merged != 0 && context_.fragments != nullptr) tell_merged(warp, threads.merged);
+  count(warp, threads);
+}
+
+template <class Colors>
+[[gnu::always_inline]] inline void SplatShader::shade_quads(const Warp& warp, Threads& threads, Colors& colors) {
+  const FragmentShader shader = context_.state(warp.quads[0].draw).shader;  // all quads' state
+  if (__builtin_expect(shader == FragmentShader::alpha_threshold, 0)) return shade_by_alpha(warp, threads, colors);
+  if (__builtin_expect(shader != FragmentShader::splat, 0)) return shade_mesh(warp, threads, colors);
+  switch (context_.precision.exponential) {
+    case Exponential::exact: return shade_splats<Exponential::exact>(warp, threads, colors);
+    case Exponential::ex2: return shade_splats<Exponential::ex2>(warp, threads, colors);
+    case Exponential::fp16: return shade_splats<Exponential::fp16>(warp, threads, colors);
+    case Exponential::table256: return shade_splats<Exponential::table256>(warp, threads, colors);
+    case Exponential::table16: return shade_splats<Exponential::table16>(warp, threads, colors);
+  }
+}
+
+template <class Colors>
+[[gnu::noinline]] void SplatShader::shade_mesh(const Warp& warp, Threads& threads, Colors& colors) {
   constexpr auto row = static_cast<std::int32_t>(quads_per_tile_row);
   const auto color_of = [&](const Quad& quad) {
     return mesh_.shade(quad, static_cast<std::int32_t>(warp.tile.x * screen_tile_pixels) + 2 * (quad.position % row),
                        static_cast<std::int32_t>(warp.tile.y * screen_tile_pixels) + 2 * (quad.position / row));
   };
   const bool shades = mesh_gate_.enter();
-  for (unsigned i = 0; i < warp.count; ++i) colors.quads[i] = shades ? color_of(warp.quads[i]) : QuadColor{};
-  for (unsigned i = 0; i < warp.count; ++i) colors.covered |= static_cast<unsigned>(warp.quads[i].coverage) << (4 * i);
-  colors.live = colors.covered;
+  for (unsigned i = 0; i < warp.count; ++i) {
+    const Quad& quad = warp.quads[i];
+    colors.put(i, quad.coverage, channel_pairs(shades ? color_of(quad) : QuadColor{}));
+  }
+  threads.live = threads.covered;
 }
 
-void SplatShader::shade_by_alpha(const Warp& warp, WarpColors& colors) {
+template <class Colors>
+[[gnu::noinline]] void SplatShader::shade_by_alpha(const Warp& warp, Threads& threads, Colors& colors) {
   const bool reads = color_reads_gate_.enter();
   const float threshold = context_.state(warp.quads[0].draw).terminating_alpha();
   for (unsigned i = 0; i < warp.count; ++i) {
     const Quad& quad = warp.quads[i];
     const Lanes alpha = surface_->quad(warp.tile, quad.position).alpha;
-    colors.covered |= static_cast<unsigned>(quad.coverage) << (4 * i);
-    colors.live |= (quad.coverage & (reads ? static_cast<unsigned>(sign_mask(alpha >= threshold)) : 0U)) << (4 * i);
+    const unsigned live = quad.coverage & (reads ? static_cast<unsigned>(sign_mask(alpha >= threshold)) : 0U);
+    colors.put(i, static_cast<LaneMask>(live), ChannelPairs{});
+    threads.live |= live << (4 * i);
   }
-  std::fill(std::begin(colors.quads), std::end(colors.quads), QuadColor{});
 }
 
-template <Exponential Kind>
-void SplatShader::shade_splats(const Warp& warp, WarpColors& colors) {
+template <Exponential Kind, class Colors>
+[[gnu::noinline]] void SplatShader::shade_splats(const Warp& warp, Threads& threads, Colors& colors) {
   const float pruning_threshold = context_.state(warp.quads[0].draw).pruning_threshold;  // all quads' state
   // Sample positions are sums of small integers and halves: exact.
   const auto x = static_cast<float>(warp.tile.x * screen_tile_pixels);
   const auto y = static_cast<float>(warp.tile.y * screen_tile_pixels);
-  // Two quads at a time, which may be a pair; of an odd number the last is its own neighbour, not covered. First the
-  // colours of all, then what becomes of them: a branch on that waits for the exponential.
+  // Two quads at a time, which may be a pair; of an odd number the last is its own neighbour, not covered.
   const unsigned last = warp.count - 1U;
+  const std::uint32_t covered = threads.covered;
+  std::uint32_t live_of_warp = 0;
   for (unsigned i = 0; i < warp.count; i += 2) {
     const Quad& first = warp.quads[i];
     const Quad& second = warp.quads[i + (i < last)];
@@ -198,18 +241,20 @@ void SplatShader::shade_splats(const Warp& warp, WarpColors& colors) {
     const Attributes& of_second = is_same ? of_first : attributes_of(attributes_of_second_, second);
     const Samples::OfQuad& at_first = samples.of[first.position];
     const Samples::OfQuad& at_second = samples.of[second.position];
-    const std::uint32_t covered = first.coverage | (i == last ? 0U : static_cast<unsigned>(second.coverage) << 4U);
     const LanePair alpha = alpha_at<Kind>(x + join(at_first.x, at_second.x), y + join(at_first.y, at_second.y),
                                           is_same ? Shape(of_first) : Shape(of_first, of_second));
-    const LanePairBits kept = (alpha >= pruning_threshold) & expand_mask_pair(covered);
+    const LanePairBits kept = (alpha >= pruning_threshold) & expand_mask_pair(covered >> (4 * i));
     const LanePair visible = floats_of<LanePair>(bits_of(alpha) & kept);
+    const unsigned live = sign_mask(kept);
     const LanePair to_first = first_twice(visible);
     const LanePair to_second = second_twice(visible);
-    store({to_first * of_first.red_green, to_first * of_first.blue_one}, colors.quads[i]);
-    store({to_second * of_second.red_green, to_second * of_second.blue_one}, colors.quads[i + 1]);
-    colors.covered |= covered << (4 * i);
-    colors.live |= sign_mask(kept) << (4 * i);
+    colors.put(i, static_cast<LaneMask>(live & all_lanes),
+               {to_first * of_first.red_green, to_first * of_first.blue_one});
+    colors.put(i + 1, static_cast<LaneMask>(live >> 4U),
+               {to_second * of_second.red_green, to_second * of_second.blue_one});
+    live_of_warp |= live << (4 * i);
   }
+  threads.live = live_of_warp;
 }
 
 void SplatShader::tell_merged(const Warp& warp, std::uint32_t threads) const {
@@ -220,18 +265,11 @@ void SplatShader::tell_merged(const Warp& warp, std::uint32_t threads) const {
   }
 }
 
-void SplatShader::put_out(const Warp& warp, const WarpColors& colors, ShadedWarp& out) {
-  out.tile = warp.tile;
-  out.sequence = warp.sequence;
-  out.tile_sequence = warp.tile_sequence;
-  out.mark = Mark::none;
-  const unsigned last = warp.count - 1U;
-  const unsigned merge_pairs = warp.merge_pairs != 0 && pairing_gate_.enter() ? warp.merge_pairs : 0U;
-  const std::uint32_t covered_of_warp = colors.covered;
-  const std::uint32_t live_of_warp = colors.live;
+void SplatShader::shade_pairs(const Warp& warp, Threads& threads, ShadedWarp& out) {
+  // First the colours of all, then what becomes of them: a branch on that waits for the exponential.
+  AllColors colors;
+  shade_quads(warp, threads, colors);
   unsigned count = 0;
-  std::uint32_t merged = 0;  // a bit a thread of a back quad that its front takes up, where both are live
-  std::uint32_t merged_quads = 0;
   // Written whether the quad lives or not, since a branch would be mispredicted too often.
   const auto put = [&](const Quad& quad, LaneMask live, const ChannelPairs& color) {
     store(color, out.color[count]);
@@ -241,64 +279,45 @@ void SplatShader::put_out(const Warp& warp, const WarpColors& colors, ShadedWarp
     if (several_draws_) out.draw[count] = quad.draw;
     count += live != 0;
   };
-  const auto color_of = [&](unsigned quad) { return channel_pairs(colors.quads[quad]); };
-  const auto live_in = [&](unsigned quad) { return static_cast<LaneMask>(live_of_warp >> (4 * quad) & all_lanes); };
-  for (unsigned i = 0; merge_pairs == 0 && i < warp.count; ++i) put(warp.quads[i], live_in(i), color_of(i));
-  for (unsigned i = 0; merge_pairs != 0 && i < warp.count; i += 2) {
+  const auto live_in = [&](unsigned quad) { return static_cast<LaneMask>(threads.live >> (4 * quad) & all_lanes); };
+  const unsigned last = warp.count - 1U;
+  for (unsigned i = 0; i < warp.count; i += 2) {
     const LaneMask front = live_in(i);
     const LaneMask back = i < last ? live_in(i + 1) : LaneMask{0};
-    if ((merge_pairs >> (i / 2) & 1U) != 0 && front != 0 && back != 0) {
-      put(warp.quads[i], static_cast<LaneMask>(front | back), blend_front_to_back(color_of(i), color_of(i + 1)));
+    const ChannelPairs& of_front = colors.of_quad[i];
+    const ChannelPairs& of_back = colors.of_quad[i + 1];
+    if ((warp.merge_pairs >> (i / 2) & 1U) != 0 && front != 0 && back != 0) {
+      put(warp.quads[i], static_cast<LaneMask>(front | back), blend_front_to_back(of_front, of_back));
       out.last_primitive[count - 1] = primitive_order(warp.quads[i + 1]);
-      merged |= (unsigned{front} & back) << (4 * i + 4);
-      merged_quads |= 1U << (4 * i + 4);
+      threads.merged |= (unsigned{front} & back) << (4 * i + 4);
+      threads.merged_quads |= 1U << (4 * i + 4);
     } else {
-      put(warp.quads[i], front, color_of(i));
-      put(warp.quads[i + (i < last)], back, color_of(i + 1));
+      put(warp.quads[i], front, of_front);
+      put(warp.quads[i + (i < last)], back, of_back);
     }
   }
   out.count = static_cast<std::uint8_t>(count);
-  if (__builtin_expect(context_.hands_on_coverage, 0)) add_pruned(warp, live_of_warp, merged_quads, out);
-  fragments_of_back_quads += threads_in(live_of_warp & (merged_quads * all_lanes));
-  if (merged != 0 && context_.fragments != nullptr) tell_merged(warp, merged);
-  // The threads of each draw, most often of one.
-  for (std::uint32_t left = ~0U >> (4 * (quads_per_warp - warp.count)); left != 0;) {
-    const DrawIndex draw = warp.quads[static_cast<unsigned>(__builtin_ctz(left)) / 4].draw;
-    const std::uint32_t threads = several_draws_ ? threads_of(warp, draw) : left;
-    const std::uint32_t covered = covered_of_warp & threads;
-    const std::uint32_t live = live_of_warp & threads;
-    const std::uint32_t quads = threads & 0x11111111U;  // a bit a quad
-    const std::uint32_t live_quads = (live | live >> 1U | live >> 2U | live >> 3U) & quads;
-    quads_shaded.add(draw, threads_in(quads));
-    fragments_shaded.add(draw, threads_in(covered));
-    quads_pruned.add(draw, threads_in(quads & ~live_quads));
-    fragments_pruned.add(draw, threads_in(covered & ~live));
-    quads_merged.add(draw, threads_in(merged_quads & threads));
-    fragments_merged.add(draw, threads_in(merged & threads));
-    left &= ~threads;
-  }
 }
 
-[[gnu::noinline]] void SplatShader::add_pruned(const Warp& warp, std::uint32_t live, std::uint32_t merged_quads,
-                                               ShadedWarp& out) const {
+[[gnu::noinline]] void SplatShader::add_pruned(const Warp& warp, const Threads& threads, ShadedWarp& out) const {
   if (context_.state(warp.quads[0].draw).tests_late()) {  // what that leaves is all that takes part
     out.covered = out.live;
     return;
   }
   unsigned from = out.count;
-  unsigned to = warp.count - threads_in(merged_quads);
+  unsigned to = warp.count - threads_in(threads.merged_quads);
   out.count = static_cast<std::uint8_t>(to);
   LaneMask of_back = 0;
   // Those that survive move towards the end, so the last goes first.
   for (unsigned i = warp.count; i-- > 0;) {
     const Quad& quad = warp.quads[i];
-    if ((merged_quads >> (4 * i) & 1U) != 0) {
+    if ((threads.merged_quads >> (4 * i) & 1U) != 0) {
       of_back = quad.coverage;
       continue;
     }
     --to;
     out.covered[to] = static_cast<LaneMask>(quad.coverage | std::exchange(of_back, LaneMask{0}));
-    if ((live >> (4 * i) & all_lanes) != 0) {
+    if ((threads.live >> (4 * i) & all_lanes) != 0) {
       --from;
       out.color[to] = out.color[from];
       out.position[to] = out.position[from];

@@ -227,20 +227,41 @@ class SplatShader : public SmBehaviour {
   void set_up(Attributes& attributes, const Quad& quad);
   using AttributeTable = std::array<Attributes, 32>;
   const Attributes& attributes_of(AttributeTable& table, const Quad& quad);
-  /// The colours of a warp's quads, before merging.
-  struct WarpColors {
-    QuadColor quads[quads_per_warp];
-    std::uint32_t covered = 0;  ///< threads, a bit each
-    std::uint32_t live = 0;     ///< of these, not pruned
+  /// Of a warp's threads, a bit each.
+  struct Threads {
+    std::uint32_t covered = 0;
+    std::uint32_t live = 0;          ///< of these, not pruned
+    std::uint32_t merged = 0;        ///< of back quads that their fronts take up, where both are live
+    std::uint32_t merged_quads = 0;  ///< the first of each such quad
   };
-  template <Exponential Kind>
-  void shade_splats(const Warp& warp, WarpColors& colors);
-  void shade_mesh(const Warp& warp, WarpColors& colors);
-  void shade_by_alpha(const Warp& warp, WarpColors& colors);
+  // What takes the colours of a warp's quads, in their order: those of all, or, one behind the other, of those that live. Behind the
+  // last may come one that is dead.
+  struct AllColors {
+    void put(unsigned index, LaneMask, const ChannelPairs& color) { of_quad[index] = color; }
+    ChannelPairs of_quad[quads_per_warp];
+  };
+  struct LiveColors {
+    /// Written in any case, since a branch would be mispredicted too often.
+    void put(unsigned, LaneMask live, const ChannelPairs& color) {
+      store(color, *next);
+      next += live != 0;
+    }
+    QuadColor* next;
+  };
+  /// Says as well which threads live.
+  template <class Colors>
+  void shade_quads(const Warp& warp, Threads& threads, Colors& colors);
+  template <Exponential Kind, class Colors>
+  void shade_splats(const Warp& warp, Threads& threads, Colors& colors);
+  template <class Colors>
+  void shade_mesh(const Warp& warp, Threads& threads, Colors& colors);
+  template <class Colors>
+  void shade_by_alpha(const Warp& warp, Threads& threads, Colors& colors);
+  /// Shades a warp with pairs, merges them, and hands on what lives.
+  [[gnu::noinline]] void shade_pairs(const Warp& warp, Threads& threads, ShadedWarp& out);
   /// Puts quads without a live fragment in their places among those that are handed on, and says what all cover.
-  void add_pruned(const Warp& warp, std::uint32_t live, std::uint32_t merged_quads, ShadedWarp& out) const;
-  /// Merges, counts, and hands on what is live.
-  void put_out(const Warp& warp, const WarpColors& colors, ShadedWarp& out);
+  void add_pruned(const Warp& warp, const Threads& threads, ShadedWarp& out) const;
+  void count(const Warp& warp, const Threads& threads);
   void tell_merged(const Warp& warp, std::uint32_t threads) const;
   /// Alpha at the samples of two quads.
   template <Exponential Kind>

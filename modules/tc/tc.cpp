@@ -27,9 +27,7 @@ void TileCoalescing::flush_bin(std::uint32_t index, FlushReason reason, Flush& o
   out.tile = bin.tile;
   out.reason = reason;
   flush_sizes.see(bin.count);
-  std::swap(out.quads, bin.quads);
-  out.quads.resize(bin.count);
-  bin.quads.resize(bin_quads_);
+  out.quads.assign(bin.quads.begin(), bin.quads.begin() + bin.count);
   bin.count = 0;
   bin_of_tile_[grid_.index(bin.tile)] = -1;
   free_.push_back(index);

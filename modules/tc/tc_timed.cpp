@@ -97,6 +97,7 @@ class TimedTc : public TimedUnit {
 
   /// Flushes the bins whose time is out before a quad comes.
   void flush_idle(Cycle next_arrival) {
+    if (next_arrival <= last_arrival_ + idle_timeout_cycles_) return;
     for (Cycle due = timeout_due(); due < next_arrival; due = timeout_due()) {
       if (!time_out_gate_.enter()) {
         idle_timeout_cycles_ = 0;

@@ -127,11 +127,12 @@ class Histogram : public Statistic {
 
   Histogram(StatisticSet& owner, Buckets buckets, const char* name, const char* unit, const char* meaning);
 
-  void see(std::uint64_t value) {
+  /// times: at least 1
+  void see(std::uint64_t value, std::uint64_t times = 1) {
     const std::uint32_t bucket = buckets_.of(value);
-    ++counts_[bucket];
+    counts_[bucket] += times;
     if (buckets_.is_one_value(bucket)) return;  // its count says it all
-    sum_ += value;
+    sum_ += value * times;
     smallest_ = std::min(smallest_, value);
     largest_ = std::max(largest_, value);
   }

@@ -28,7 +28,7 @@ struct SectoredCacheStatistics : StatisticSet {
   bool has_details() const { return !fill_cycles.is_left_out(); }
   /// Sectors of a line, a bit each, have come together.
   void see_fill(std::uint32_t sectors, Cycle took) {
-    for (std::uint32_t left = has_details() ? sectors : 0; left != 0; left &= left - 1) fill_cycles.see(took);
+    if (has_details() && sectors != 0) fill_cycles.see(took, static_cast<unsigned>(__builtin_popcount(sectors)));
   }
 
   Counter line_accesses{*this, "line_accesses", "accesses", "one for each item that needs sectors of a line"};
@@ -72,14 +72,12 @@ class AnnotatedFillCounter {
   /// @param statistics  outlive it
   explicit AnnotatedFillCounter(SectoredCacheStatistics& statistics) : statistics_(&statistics) {}
 
-  /// So many sectors are asked for in cycle `at`.
+  /// So many sectors, at least 1, are asked for in cycle `at`.
   void ask(std::uint32_t sectors, Cycle at, Cycle there) {
     if (!statistics_->has_details()) return;
     for (; !fills_.empty() && fills_.front().there <= at; fills_.pop()) on_their_way_ -= fills_.front().sectors;
-    for (std::uint32_t i = 0; i < sectors; ++i) {
-      statistics_->fill_cycles.see(there - at);
-      statistics_->sectors_filling.see(on_their_way_++);
-    }
+    statistics_->fill_cycles.see(there - at, sectors);
+    for (std::uint32_t i = 0; i < sectors; ++i) statistics_->sectors_filling.see(on_their_way_++);
     fills_.push_in_order({there, sectors}, &Fill::there);
   }
 

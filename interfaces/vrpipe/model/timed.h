@@ -197,8 +197,7 @@ class TimedOut : public OutEnd<Item> {
   /// Sends an item whose parts are there in the cycles `at`, and which takes the link for so many. `joins`: its first part
   /// goes with the last one of the item before it, beside which it takes the link. Returns the cycles in which it is taken.
   CycleInterval send(const Item& item, CycleInterval at, unsigned beats = 1, bool joins = false) {
-    for (; this->stalled_at(at.first); ++at.first) at.last = std::max(at.last, at.first + 1);
-    if (rate_) at = limited(at, beats);
+    if (this->limited_) at = limited(at, beats);
     ++this->transferred_;
     at = direct_ != nullptr ? direct_->offer(item, at, beats, joins, this->pipeline_) : call(item, at, beats, joins);
     last_ = at.last;
@@ -229,8 +228,10 @@ class TimedOut : public OutEnd<Item> {
     this->socket->b_transport(payload, delay);
     return {payload.at, payload.last};
   }
-  /// When the link passes an item, at its rate.
-  CycleInterval limited(CycleInterval at, unsigned beats) {
+  /// When the link passes an item, between random stalls and at its rate.
+  [[gnu::noinline]] CycleInterval limited(CycleInterval at, unsigned beats) {
+    for (; this->stalled_at(at.first); ++at.first) at.last = std::max(at.last, at.first + 1);
+    if (!rate_) return at;
     const CycleInterval passes = rate_->take(at.first, beats);
     return {passes.first, std::max(passes.last, at.last + (passes.first - at.first))};
   }
@@ -327,8 +328,9 @@ class TimedIn : public InEnd<Item> {
     if (last_place >= depth_) last_place -= depth_;
     at.last = std::max(at.last, free_at_[last_place]);
     const CycleInterval left = handler_(item, visible(at, pipeline));
+    const bool one_a_cycle = left.last - left.first + 1 == beats;
     for (unsigned beat = 0; beat < beats; ++beat) {
-      free_at_[place] = left.of_part(beat, beats) + 1;
+      free_at_[place] = (one_a_cycle ? left.first + beat : left.of_part(beat, beats)) + 1;
       place = place + 1 == depth_ ? 0 : place + 1;
     }
     place_ = place;
@@ -372,6 +374,7 @@ template <class Item>
 void TimedOut<Item>::connect(InPort& in, const LinkOptions& options) {
   OutEnd<Item>::connect(in, options);
   if (options.items_per_cycle != 0) rate_.emplace(options.items_per_cycle);
+  this->limited_ = this->limited_ || rate_;
   end_ = dynamic_cast<TimedIn<Item>*>(&in);
   if (end_ != nullptr) end_->begin_ = this;
   if (end_ != nullptr && options.observers.empty() && !clock_.domain->passes_sockets()) direct_ = end_;

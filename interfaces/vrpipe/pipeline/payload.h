@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <deque>
 #include <vector>
 
@@ -35,7 +36,7 @@ enum class Mark : std::uint16_t { none = 0, end_of_frame = 0xffff };
 struct TileId {
   std::uint16_t x = 0;
   std::uint16_t y = 0;
-  friend bool operator==(TileId a, TileId b) { return a.x == b.x && a.y == b.y; }
+  friend bool operator==(TileId a, TileId b) { return std::memcmp(&a, &b, sizeof a) == 0; }  // in one word
   friend bool operator!=(TileId a, TileId b) { return !(a == b); }
 };
 

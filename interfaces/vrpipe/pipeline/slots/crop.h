@@ -11,6 +11,7 @@
 #include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/memory/sectors.h>
 #include <vrpipe/pipeline/framebuffer.h>
+#include <vrpipe/pipeline/quad_sectors.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
 namespace vrpipe {
@@ -46,12 +47,12 @@ class CropBehaviour : public Behaviour {
 
   /// What the colour cache does for a line that quads need.
   using LineAccess = vrpipe::LineAccess;
-  /// And for quads of a warp; quad `i` needs `sectors_of[i]` of the line in `lines[line_of[i]]`.
+  /// And for quads of a warp, whose sectors are those of their places in the screen tile (CropTime::sectors_of_quads).
   struct CacheLookUp {
     unsigned count = 0;  ///< of lines, in the order in which they are needed first
     std::array<LineAccess, quads_per_warp> lines;
-    std::array<std::uint8_t, quads_per_warp> line_of{};
-    std::array<std::uint32_t, quads_per_warp> sectors_of{};
+    std::array<std::uint8_t, positions_per_tile> place_of{};  ///< in `lines`, of those of the tile's that are needed
+    const LineAccess& line_of(const QuadSectors& quad) const { return lines[place_of[quad.line]]; }
   };
   /// Looks quads `from` to `to` - 1 of a warp up, before their `blend`, in the order of blending. The cache sees this
   /// order alone, so that which sectors move does not depend on when; for timing models that do not follow fills through the
