@@ -317,9 +317,14 @@ std::vector<PrecisionSettings> choose_values(const AccuracyJob& job, bool is_dra
         result.precision.push_back({&knob, value, 0});
         continue;
       }
+      PrecisionSettings tried = settings.front();
+      knob.set(tried, value);
+      if (!can_round(tried)) {
+        result.values_never_measured.push_back(knob.name + "=" + value);
+        continue;
+      }
       result.precision.push_back({&knob, value, settings.size()});
-      settings.push_back(settings.front());
-      knob.set(settings.back(), value);
+      settings.push_back(std::move(tried));
       result.runs.emplace_back();
       result.runs.back().name = knob.name + "=" + value;
     }

@@ -94,6 +94,7 @@ struct AccuracyResult {
   std::vector<PrecisionRow> precision;      ///< by knob
   std::vector<std::string> knobs_left_out;  ///< those that mean nothing for a draw list
   std::vector<std::string> knobs_without_pipeline;  ///< those that mean nothing for what draws outside it
+  std::vector<std::string> values_never_measured;   ///< KNOB=VALUE, of which nobody knows the measured rounding
   std::vector<StressRow> stress;                    ///< by configuration, then by variant
   std::vector<StressLeftOut> stress_left_out;
   Picture reference;             ///< the exact image, for the page

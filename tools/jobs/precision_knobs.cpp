@@ -75,7 +75,7 @@ std::vector<PrecisionKnob> make_knobs() {
   knobs.push_back({"format",
                    "--format ",
                    "what the colour target stores per channel",
-                   {"rgba8", "rgba16f", "rgba32f"},
+                   {"rgba8", "srgb8", "rgba16f", "rgba16", "rgba32f"},
                    "rgba8",
                    false,
                    [](const PrecisionSettings& settings) { return vrpipe::name_of(settings.request.format); },
@@ -123,6 +123,13 @@ std::vector<PrecisionKnob> make_knobs() {
 const std::vector<PrecisionKnob>& precision_knobs() {
   static const std::vector<PrecisionKnob> knobs = make_knobs();
   return knobs;
+}
+
+bool can_round(const PrecisionSettings& settings) {
+  const auto& knobs = precision_knobs();
+  const auto rounding =
+      std::find_if(knobs.begin(), knobs.end(), [](const PrecisionKnob& knob) { return knob.name == "blend_rounding"; });
+  return is_measured(settings.request.format) || rounding->value(settings) != "measured";
 }
 
 std::string readable_value(const PrecisionKnob& knob, const std::string& value) {

@@ -33,6 +33,9 @@ struct PrecisionKnob {
 /// All knobs, in the order of reports.
 const std::vector<PrecisionKnob>& precision_knobs();
 
+/// Whether the model knows how to round to the format: as measured it does for some.
+bool can_round(const PrecisionSettings& settings);
+
 /// The value as people write it: n/255 for the thresholds that are one, else as it is.
 std::string readable_value(const PrecisionKnob& knob, const std::string& value);
 

@@ -99,6 +99,7 @@ Json accuracy_json(const AccuracyResult& result) {
                {"precision_fidelity", vrpipe::name_of(result.base.fidelity)},
                {"precision_processes", result.processes},
                {"knobs_left_out", left_out},
+               {"values_never_measured", result.values_never_measured},
                {"tolerances",
                 {{"cpu_seconds_percent", 100 * fidelity_tolerance.cost_share},
                  {"cycles_error_percent", fidelity_tolerance.error},

@@ -379,6 +379,10 @@ std::vector<std::string> precision_summary(const AccuracyResult& result) {
   if (!result.knobs_left_out.empty()) {
     lines.push_back("left out, since a draw list is preprocessed already: " + joined(result.knobs_left_out));
   }
+  if (!result.values_never_measured.empty()) {
+    lines.push_back("left out, since no GPU's blender into that format has been measured: " +
+                    joined(result.values_never_measured));
+  }
   if (!result.knobs_without_pipeline.empty()) {
     lines.push_back("left out, since they are of the graphics pipeline: " + joined(result.knobs_without_pipeline));
   }
