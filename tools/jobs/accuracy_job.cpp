@@ -122,10 +122,27 @@ void write_image(const AccuracyJob& job, AccuracyResult& result, const std::stri
   result.files.write(files.exr, encode_exr(image), "--output");
 }
 
-/// The image that errors are measured against: all bands, exact order.
-ShownImage make_reference(const AccuracyJob& job, const Workload& workload, AccuracyResult& result) {
+/// What errors are measured against: the image with all bands in exact order, and what is proved of each run.
+struct Reference {
+  ShownImage image;
+  std::vector<std::uint32_t> fragments;     ///< of each pixel
+  std::vector<std::vector<double>> proved;  ///< of each run, of each pixel as it is shown; empty where nothing is
+};
+
+Reference make_reference(const AccuracyJob& job, const Workload& workload,
+                         const std::vector<PrecisionSettings>& settings, AccuracyResult& result) {
   const Stopwatch watch;
-  const ExactImage exact = render_exactly(*workload.draw_with(workload.options.exact()));
+  std::vector<DrawnPrecision> precisions;
+  std::vector<std::size_t> runs;
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    const auto precision =
+        workload.scene.draw_list ? drawn_precision({settings[i].request, {}}) : drawn_precision(settings[i]);
+    if (!precision) continue;
+    precisions.push_back(*precision);
+    runs.push_back(i);
+  }
+  const BoundedImage bounded = render_with_bounds(*workload.draw_with(workload.options.exact()), precisions);
+  const ExactImage& exact = bounded.exact;
   result.reference_seconds = watch.seconds();
   if (job.simulation.output) {
     SharedImage image(exact.width, exact.height);
@@ -135,9 +152,32 @@ ShownImage make_reference(const AccuracyJob& job, const Workload& workload, Accu
     }
     write_image(job, result, reference_name, image);
   }
-  ShownImage reference = shown(exact, job.simulation.background);
-  if (job.html) result.reference = picture_of(reference, reference_width);
+  Reference reference{shown(exact, job.simulation.background), bounded.fragments, {}};
+  if (job.html) result.reference = picture_of(reference.image, reference_width);
+  const auto& background = job.simulation.background;
+  const double brightest = *std::max_element(background.begin(), background.end());
+  reference.proved.resize(settings.size());
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    // What alpha lets through is background.
+    for (const PixelBound& bound : bounded.bounds[i])
+      reference.proved[runs[i]].push_back(std::min(1.0, bound.color + brightest * bound.alpha));
+  }
   return reference;
+}
+
+/// Read from a memory and written to it; none where it counts nothing.
+std::optional<std::uint64_t> bytes_moved(const RunResult& run, const std::string& memory) {
+  std::optional<std::uint64_t> bytes;
+  for (const StatisticReport& report : run.statistics) {
+    if (report.name.rfind(memory + ".", 0) != 0) continue;
+    for (const std::string ending : {"_bytes_read", "_bytes_written"}) {
+      if (report.name.size() > ending.size() &&
+          report.name.compare(report.name.size() - ending.size(), ending.size(), ending) == 0) {
+        bytes = bytes.value_or(0) + report.value;
+      }
+    }
+  }
+  return bytes;
 }
 
 /// A precision run's name as part of a file's.
@@ -333,8 +373,9 @@ std::vector<PrecisionSettings> choose_values(const AccuracyJob& job, bool is_dra
 }
 
 void climb_precisions(const AccuracyJob& job, const Workload& workload, const std::vector<PrecisionSettings>& settings,
-                      const ShownImage& reference, const BatchPlace& place, AccuracyResult& result,
+                      const Reference& reference, const BatchPlace& place, AccuracyResult& result,
                       ProgressLine& progress) {
+  const EnergyTable& energies = shipped_energies();
   std::vector<Task> tasks;
   for (std::size_t i = 0; i < settings.size(); ++i) {
     const PreprocessOptions options = settings[i].preprocess;
@@ -347,12 +388,19 @@ void climb_precisions(const AccuracyJob& job, const Workload& workload, const st
     PrecisionRun& run = result.runs[index];
     run.run = std::move(simulated.result);
     const ShownImage image = shown(*simulated.image, job.simulation.background);
-    run.error = image_error(image, reference);
+    run.error = image_error(image, reference.image);
+    const std::vector<double>& proved = reference.proved[index];
+    run.by_fragments = error_by_fragments(image, reference.image, reference.fragments, proved);
+    if (!proved.empty()) run.proved_max_error = *std::max_element(proved.begin(), proved.end());
+    run.l2_bytes = bytes_moved(run.run, "l2");
+    run.dram_bytes = bytes_moved(run.run, "dram");
+    const EnergyAmounts amounts = energy_amounts(run.run, energies);
+    if (amounts.is_known) run.millijoules = energy_report(amounts, energies).total;
     if (const StatisticReport* const stuck = statistic_named(run.run.statistics, "crop.pixels_stuck"))
       run.pixels_stuck = stuck->value;
     if (job.html) {
       run.picture = picture_of(image, picture_width);
-      run.error_map = error_map(image, reference, picture_width);
+      run.error_map = error_map(image, reference.image, picture_width);
     }
     if (job.simulation.output) write_image(job, result, file_name(run.name), *simulated.image);
   });
@@ -385,11 +433,11 @@ AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) 
   const Workload workload = load(job, result);
   if (job.simulation.output) create_output_folder(*job.simulation.output, "--output");
   save_draw(job.simulation, *workload.draw);
+  const std::vector<PrecisionSettings> values = choose_values(job, workload.scene.draw_list.has_value(), result);
   progress.show("rendering the exact image");
-  const ShownImage reference = make_reference(job, workload, result);
+  const Reference reference = make_reference(job, workload, values, result);
 
   const std::vector<RunRequest> levels = fidelity_requests(job);
-  const std::vector<PrecisionSettings> values = choose_values(job, workload.scene.draw_list.has_value(), result);
   const std::vector<Task> stress = stress_tasks(job, workload, result);
   const std::size_t climbs = job.repeat * levels.size();
   const Stopwatch ladders;

@@ -11,6 +11,8 @@
 #include "host/progress_line.h"
 #include "image/image_error.h"
 #include "image/picture.h"
+#include "jobs/energy.h"
+#include "jobs/error_by_fragments.h"
 #include "jobs/precision_knobs.h"
 #include "jobs/simulation_job.h"
 #include "jobs/trade_off.h"
@@ -50,7 +52,12 @@ struct PrecisionRun {
   std::string name;  ///< KNOB=VALUE, or "default"
   RunResult run;
   ImageError error;                             ///< against the exact image
+  std::optional<double> proved_max_error;       ///< that no pixel passes; none where nothing is proved
+  std::vector<ErrorOfRange> by_fragments;       ///< by the exact number of a pixel
   std::uint64_t pixels_stuck = 0;               ///< below the termination threshold, by rounding
+  std::optional<std::uint64_t> l2_bytes;        ///< read and written; none where no L2 counts
+  std::optional<std::uint64_t> dram_bytes;      ///< the same
+  std::optional<Range> millijoules;             ///< none without time
   std::optional<double> cycles_change_percent;  ///< against the default; none without time
   bool on_front = false;                        ///< the Pareto front of cycles and PSNR; false without time
   Picture picture, error_map;                   ///< for the page; else empty

@@ -132,6 +132,28 @@ bool can_round(const PrecisionSettings& settings) {
   return is_measured(settings.request.format) || rounding->value(settings) != "measured";
 }
 
+std::optional<DrawnPrecision> drawn_precision(const PrecisionSettings& settings) {
+  const RunRequest& request = settings.request;
+  const DrawState state = draw_state_of(request);
+  const double visible = 1.0 / 255.0;
+  const bool is_cut =
+      state.splat_extent == SplatExtent::three_sigma || state.obb_padding < 0.7072F || state.obb_padding > 1.0F;
+  // Without pruning a larger box has more fragments.
+  const bool is_wider =
+      state.splat_extent != SplatExtent::oriented_box && static_cast<double>(state.pruning_threshold) < 0.999 * visible;
+  if (is_cut || is_wider || !(settings.preprocess == settings.preprocess.exact()) || !request.units.empty() ||
+      !request.variant.is_of_pipeline() || !request.variant.changed_units.empty()) {
+    return std::nullopt;
+  }
+  DrawnPrecision drawn;
+  drawn.format = request.format;
+  drawn.device = device_precision_of(request);
+  drawn.merges = request.variant.quad_merging;
+  drawn.pruning_threshold = static_cast<double>(state.pruning_threshold);
+  if (request.variant.early_termination) drawn.termination_threshold = static_cast<double>(state.termination_threshold);
+  return drawn;
+}
+
 std::string readable_value(const PrecisionKnob& knob, const std::string& value) {
   if (knob.name != "pruning_threshold") return value;
   for (int n = 1; n < 255; ++n) {

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <vrpipe/platforms/simulation.h>
+#include <vrpipe/workloads/exact_image.h>
 #include <vrpipe/workloads/preprocess.h>
 
 namespace vrpipe::tools {
@@ -35,6 +37,10 @@ const std::vector<PrecisionKnob>& precision_knobs();
 
 /// Whether the model knows how to round to the format: as measured it does for some.
 bool can_round(const PrecisionSettings& settings);
+
+/// By which a bound on the error of these settings is proved; none where there is no proof: other splats than the exact image's, boxes
+/// that cut off what is visible, units of one's own, or no pipeline.
+std::optional<DrawnPrecision> drawn_precision(const PrecisionSettings& settings);
 
 /// The value as people write it: n/255 for the thresholds that are one, else as it is.
 std::string readable_value(const PrecisionKnob& knob, const std::string& value);

@@ -9,6 +9,7 @@
 #include <vrpipe/arithmetic/blend.h>
 
 #include "jobs/optional_json.h"
+#include "output/energy_report.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -39,6 +40,15 @@ Json fidelity_json(const FidelityLevel& level) {
 
 Json precision_json(const PrecisionRow& row, const PrecisionRun& run) {
   const bool free = run.cycles_change_percent && *run.cycles_change_percent == 0;
+  Json by_fragments = Json::array();
+  for (const ErrorOfRange& range : run.by_fragments) {
+    by_fragments.push_back({{"from", range.from},
+                            {"to", range.to},
+                            {"pixels", range.pixels},
+                            {"mean_abs_error", range.mean_abs_error},
+                            {"max_abs_error", range.max_abs_error},
+                            {"proved_max_abs_error", optional_json(range.proved_max_error)}});
+  }
   return {{"knob", row.knob->name},
           {"value", row.value},
           {"option", row.knob->option},
@@ -49,11 +59,16 @@ Json precision_json(const PrecisionRow& row, const PrecisionRun& run) {
           {"psnr_db", decibels_json(run.error.psnr_db)},
           {"ssim", run.error.ssim},
           {"max_abs_error", run.error.max_abs_error},
+          {"proved_max_abs_error", optional_json(run.proved_max_error)},
           {"pixels_differing_8bit", run.error.pixels_differing},
           {"share_differing_8bit", run.error.share_differing},
           {"pixels_stuck", run.pixels_stuck},
           {"cycles", cycles_json(run.run)},
           {"cycles_change_percent", optional_json(run.cycles_change_percent)},
+          {"l2_bytes", run.l2_bytes ? Json(*run.l2_bytes) : Json()},
+          {"dram_bytes", run.dram_bytes ? Json(*run.dram_bytes) : Json()},
+          {"millijoules", range_json(run.millijoules)},
+          {"by_fragments", std::move(by_fragments)},
           {"costs_no_time", run.cycles_change_percent ? Json(free) : Json()},
           {"host_seconds", run.run.host_seconds},
           {"cpu_seconds", run.run.cpu_seconds},
