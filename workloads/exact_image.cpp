@@ -188,6 +188,12 @@ double error_of_exponential(Exponential exponential) {
   return 1;
 }
 
+/// Relative, of what is sent to be blended: in binary16 a merge rounds both fragments, 1 - alpha and the result, and sending rounds once.
+double error_of_sending(const DrawnPrecision& drawn) {
+  const bool merges_in_half = drawn.merges && drawn.device.merging == NumberFormat::fp16;
+  return (merges_in_half ? 5 * kHalf : 0) + (drawn.device.export_format == NumberFormat::fp16 ? 2 * kHalf : 0);
+}
+
 /// A pixel's bound on its way, in one precision.
 struct BoundOnItsWay {
   PixelBound bound;
@@ -201,8 +207,23 @@ class BoundPrecision {
  public:
   explicit BoundPrecision(const DrawnPrecision& drawn)
       : drawn_(drawn),
-        running_(drawn.format, drawn.device.blend_rounding, drawn.merges),
-        exponential_(error_of_exponential(drawn.device.exponential)) {}
+        running_(drawn.format, drawn.device.blend_rounding, drawn.merges, error_of_sending(drawn)),
+        exponential_(error_of_exponential(drawn.device.exponential)),
+        is_half_(drawn.device.shading == NumberFormat::fp16),
+        alpha_max_(static_cast<double>(drawn.device.alpha_max)) {
+    const AttributeFormat attributes = drawn.device.attributes;
+    const bool half_attributes = attributes != AttributeFormat::fp32 || is_half_;
+    // Roundings of u and v beside single precision's: of a difference, a product and a sum; and of the matrix.
+    of_position_ = 16 * kSingle + (is_half_ ? 4 * kHalf : 0) + (half_attributes ? kHalf : 0);
+    of_power_ = 6 * kSingle + (is_half_ ? 5 * kHalf : 0);
+    // Of the exponential's result, and of the product with opacity.
+    exponential_ += is_half_ ? 3 * kHalf : 0;
+    const bool is_unorm = attributes == AttributeFormat::quantized;
+    of_opacity_ = (attributes == AttributeFormat::fp16 || is_half_ ? 2 * kHalf : 0);
+    opacity_step_ = is_unorm ? 0.51 / 255.0 : 0;
+    of_color_ = 4 * kSingle + of_opacity_ + (is_half_ ? 2 * kHalf : 0);
+    color_step_ = is_unorm ? 0.51 / 255.0 : 0;
+  }
 
   /// A sample in a splat's box; `before` and `after` are the exact pixel's alpha, `color_after` its largest channel.
   void add(const ExactSplat& splat, const ExactSplat::Sample& sample, double before, double after, double color_after,
@@ -216,7 +237,8 @@ class BoundPrecision {
     // What is blended on one side alone is off by all of it.
     const double sent = is_certain ? off : sample.weight + off;
     const double color = splat.largest_color();
-    const FragmentBound sent_off{color * sent + 4 * kSingle * color * (alpha + sent), sent};
+    const double color_off = of_color_ * color + color_step_ + (color_step_ > 0 ? std::max(0.0, color - 1) : 0);
+    const FragmentBound sent_off{color * sent + color_off * (alpha + sent), sent};
     running_.blended(pixel.bound, alpha, alpha * color, before, after, color_after, sent_off);
     pixel.largest_alpha_bound = std::max(pixel.largest_alpha_bound, pixel.bound.alpha);
     if (!drawn_.termination_threshold) return;
@@ -236,21 +258,31 @@ class BoundPrecision {
     // u and v are sums of two products of a rounded difference and a rounded element of the axes' inverse, at most 1/|axis|.
     const double reach_u = sample.distance * splat.a().sigmas_per_pixel;
     const double reach_v = sample.distance * splat.b().sigmas_per_pixel;
-    const double relative = 16 * kSingle;
-    const double off_u = relative * reach_u;
-    const double off_v = relative * reach_v;
+    const double off_u = of_position_ * reach_u;
+    const double off_v = of_position_ * reach_v;
     const double squared = sample.u * sample.u + sample.v * sample.v;
     const double power = 0.5 * (2 * (std::fabs(sample.u) * off_u + std::fabs(sample.v) * off_v) + off_u * off_u +
-                                off_v * off_v + 6 * kSingle * squared);
+                                off_v * off_v + of_power_ * squared);
     // e^power - 1, rounded up.
     const double of_power = power < 1 ? power * (1 + power) : portable_exp(std::min(power, 80.0));
-    const double off = sample.weight * (of_power + (1 + of_power) * (exponential_ + 2 * kSingle));
-    return std::min(off, std::max(splat.opacity() - sample.weight, sample.weight) + 1e-6);
+    const double of_gauss = of_power + (1 + of_power) * (exponential_ + 2 * kSingle);
+    const double gauss = sample.weight / splat.opacity();
+    const double off = sample.weight * (of_gauss + (1 + of_gauss) * of_opacity_) +
+                       opacity_step_ * std::min(1.0, gauss * (1 + of_gauss)) + (is_half_ ? 1e-6 : 0);
+    const double of_clamp = std::max(0.0, std::min(sample.weight, std::max(kLargestAlpha, alpha_max_)) -
+                                              std::min(kLargestAlpha, alpha_max_));
+    const double most = splat.opacity() + opacity_step_ + 4 * kHalf * (is_half_ || of_opacity_ > 0 ? 1 : 0);
+    return std::min(off, std::max(most - sample.weight, sample.weight) + 1e-6) + of_clamp +
+           (is_half_ && sample.weight > 0.5 * alpha_max_ ? kHalf : 0);  // of the clamp itself
   }
 
   DrawnPrecision drawn_;
   RunningBound running_;
-  double exponential_;
+  double exponential_;  ///< relative
+  bool is_half_;
+  double alpha_max_;
+  double of_position_ = 0, of_power_ = 0, of_opacity_ = 0, of_color_ = 0;  ///< relative
+  double opacity_step_ = 0, color_step_ = 0;                               ///< absolute
 };
 
 }  // namespace

@@ -43,7 +43,8 @@ double color_rounding_error(ColorFormat format, BlendRounding rounding, double m
 
 void RunningBound::blended(PixelBound& bound, double fragment_alpha, double fragment_color, double pixel_alpha_before,
                            double pixel_alpha, double pixel_color, const FragmentBound& off) const {
-  const double transmittance = std::min(1.0, 1.0 - pixel_alpha_before + bound.alpha);
+  const double alpha_off = bound.alpha;
+  const double transmittance = std::min(1.0, 1.0 - pixel_alpha_before + alpha_off);
   FragmentBound sent{transmittance * off.color, transmittance * off.alpha};
   if (rounding_ == BlendRounding::measured && format_ != ColorFormat::rgba32f) {
     // The source is truncated first and 1 - alpha rounded; or the source is clamped, cut to 12 bits and rounded to 8, and
@@ -60,10 +61,14 @@ void RunningBound::blended(PixelBound& bound, double fragment_alpha, double frag
     sent.color += rounded(fragment_color, off.color, fragment_color + off.color > fragment_alpha);
     sent.alpha += rounded(fragment_alpha, off.alpha, false);
   }
-  bound.color += fragment_color * bound.alpha + sent.color;
+  bound.color += fragment_color * alpha_off + sent.color + sent_error_ * transmittance * fragment_color;
   const double reach = pixel_color + bound.color;
   bound.color += color_rounding_error(format_, rounding_, reach) + arithmetic_ * std::max(1.0, reach);
-  bound.alpha = (1.0 - fragment_alpha) * bound.alpha + sent.alpha;
+  // Of what is sent, the errors add up to no more than that share of alpha itself: apart, since what is behind the first of a
+  // pair does not lessen the pair's error.
+  const double apart = sent_error_ * pixel_alpha_before;
+  bound.alpha = (1.0 - fragment_alpha) * (alpha_off - apart) + sent.alpha + sent_error_ * alpha_off * fragment_alpha;
+  bound.alpha += sent_error_ * pixel_alpha;
   bound.alpha += alpha_rounding_error(format_, rounding_, std::min(1.0, pixel_alpha + bound.alpha)) + arithmetic_;
 }
 

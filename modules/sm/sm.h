@@ -233,18 +233,21 @@ class SplatShader : public SmBehaviour {
     std::uint32_t covered = 0;  ///< threads, a bit each
     std::uint32_t live = 0;     ///< of these, not pruned
   };
-  template <Exponential Kind>
+  template <Exponential Kind, NumberFormat Format>
   void shade_splats(const Warp& warp, WarpColors& colors);
+  template <NumberFormat Format>
+  void choose_shading(Exponential exponential);
   void shade_mesh(const Warp& warp, WarpColors& colors);
   void shade_by_alpha(const Warp& warp, WarpColors& colors);
   /// Puts quads without a live fragment in their places among those that are handed on, and says what all cover.
   void add_pruned(const Warp& warp, std::uint32_t live, std::uint32_t merged_quads, ShadedWarp& out) const;
   /// Merges, counts, and hands on what is live.
+  template <NumberFormat Merging, NumberFormat Export>
   void put_out(const Warp& warp, const WarpColors& colors, ShadedWarp& out);
   void tell_merged(const Warp& warp, std::uint32_t threads) const;
   /// Alpha at the samples of two quads.
-  template <Exponential Kind>
-  static LanePair alpha_at(LanePair x, LanePair y, const Shape& splats);
+  template <Exponential Kind, NumberFormat Format>
+  static LanePair alpha_at(LanePair x, LanePair y, const Shape& splats, float alpha_max);
 
   const RenderContext& context_;
   EffectGate several_draws_gate_;
@@ -252,6 +255,10 @@ class SplatShader : public SmBehaviour {
   EffectGate color_reads_gate_;
   EffectGate pairing_gate_;
   const bool several_draws_;
+  // What the precision calls for, chosen once.
+  void (SplatShader::*shade_splats_)(const Warp&, WarpColors&) = nullptr;
+  void (SplatShader::*put_out_)(const Warp&, const WarpColors&, ShadedWarp&) = nullptr;
+  float alpha_max_;
   TimingParameters timing_;
   /// Of the splats last set up, by the low bits of their number; two tables, so that the two quads' are there at once.
   AttributeTable attributes_of_first_;

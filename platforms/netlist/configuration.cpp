@@ -43,6 +43,11 @@ DevicePrecision device_precision_from(const StateParameters& parameters) {
   DevicePrecision precision;
   precision.blend_rounding = static_cast<BlendRounding>(static_cast<unsigned>(parameters.blend_rounding));
   precision.exponential = static_cast<Exponential>(static_cast<unsigned>(parameters.exponential));
+  precision.shading = static_cast<NumberFormat>(static_cast<unsigned>(parameters.shading));
+  precision.merging = static_cast<NumberFormat>(static_cast<unsigned>(parameters.merging));
+  precision.export_format = static_cast<NumberFormat>(static_cast<unsigned>(parameters.export_format));
+  precision.attributes = static_cast<AttributeFormat>(static_cast<unsigned>(parameters.attributes));
+  precision.alpha_max = static_cast<float>(static_cast<double>(parameters.alpha_max));
   precision.subpixel_bits = parameters.subpixel_bits;
   return precision;
 }

@@ -127,6 +127,47 @@ TEST(Bounds, HoldForEveryExponentialAndThreshold) {
   EXPECT_GT(tightest(draw, all), 0.2);
 }
 
+TEST(Bounds, HoldForEveryPrecisionOfTheShader) {
+  std::vector<Drawn> all;
+  const auto add = [&](const char* name, const char* value, const auto& change) {
+    for (const char* variant : {"baseline", "qm", "het+qm"}) {
+      for (const ColorFormat format : {ColorFormat::rgba32f, ColorFormat::rgba16, ColorFormat::rgba16f}) {
+        all.push_back(drawn(variant, format, {{"state", name, value}}));
+        change(all.back().precision.device);
+      }
+    }
+  };
+  add("shading", "fp16", [](DevicePrecision& device) { device.shading = NumberFormat::fp16; });
+  add("merging", "fp16", [](DevicePrecision& device) { device.merging = NumberFormat::fp16; });
+  add("export_format", "fp16", [](DevicePrecision& device) { device.export_format = NumberFormat::fp16; });
+  add("attributes", "fp16", [](DevicePrecision& device) { device.attributes = AttributeFormat::fp16; });
+  add("attributes", "quantized", [](DevicePrecision& device) { device.attributes = AttributeFormat::quantized; });
+  add("alpha_max", "1", [](DevicePrecision& device) { device.alpha_max = 1; });
+  add("alpha_max", "0.9", [](DevicePrecision& device) { device.alpha_max = 0.9F; });
+  // All at once.
+  for (const char* variant : {"baseline", "het+qm"}) {
+    all.push_back(drawn(variant, ColorFormat::rgba8,
+                        {{"state", "shading", "fp16"},
+                         {"state", "merging", "fp16"},
+                         {"state", "export_format", "fp16"},
+                         {"state", "attributes", "quantized"}}));
+    DevicePrecision& device = all.back().precision.device;
+    device.shading = device.merging = device.export_format = NumberFormat::fp16;
+    device.attributes = AttributeFormat::quantized;
+  }
+  EXPECT_GT(tightest(random_draw(96, 64, 1500, 3), all), 0.1);
+  std::vector<Splat> stuck(3001, flat_box(-4, -4, 12, 12, 0.02F, 1, 1, 1));
+  stuck[0] = flat_box(-4, -4, 12, 12, 0.99F, 0, 0, 0);
+  EXPECT_GT(tightest(draw_of(4, 4, std::move(stuck)), all), 0.1);
+  std::vector<Splat> edges;
+  for (const float edge : {1.0F / 255, 1.0F / 18, 0.25F, 0.99F}) {
+    for (const float alpha : {std::nextafter(edge, 0.0F), edge, std::nextafter(edge, 1.0F)}) {
+      for (int i = 0; i < 20; ++i) edges.push_back(flat_box(-4, -4, 12, 12, alpha, 0.5F, 1, 0.25F));
+    }
+  }
+  tightest(draw_of(4, 4, std::move(edges)), all);
+}
+
 TEST(Bounds, CountEachPixelsFragments) {
   const Draw draw = draw_of(4, 4, std::vector<Splat>(7, flat_box(-4, -4, 12, 12, 0.5F)));
   const BoundedImage bounded = render_with_bounds(draw, {});

@@ -175,10 +175,11 @@ TEST(AccuracyText, SaysWhatAccuracyCosts) {
 TEST(PrecisionKnobs, AreAllThatTheHardwareChooses) {
   std::vector<std::string> names;
   for (const auto& knob : tools::precision_knobs()) names.push_back(knob.name);
-  EXPECT_EQ(names, (std::vector<std::string>{"format", "blend_rounding", "termination_threshold", "termination_compare",
-                                             "termination", "pruning_threshold", "subpixel_bits", "exponential",
-                                             "depth_key_bits", "sh_degree", "splat_extent", "quad_merging",
-                                             "early_termination"}));
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"format", "blend_rounding", "termination_threshold", "termination_compare",
+                                      "termination", "pruning_threshold", "subpixel_bits", "exponential", "shading",
+                                      "merging", "attributes", "export_format", "alpha_max", "depth_key_bits",
+                                      "sh_degree", "splat_extent", "quad_merging", "early_termination"}));
   // A choice that is added to a parameter belongs here too.
   for (const ParameterListing& unit : tools::all_parameters(nullptr)) {
     for (const Parameter* parameter : unit.parameters->parameters()) {

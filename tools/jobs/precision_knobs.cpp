@@ -102,6 +102,12 @@ std::vector<PrecisionKnob> make_knobs() {
   knobs.push_back(state_knob("subpixel_bits", "of vertex coordinates", {"4", "8", "12"}, ""));
   knobs.push_back(
       state_knob("exponential", "of the fragment shader", {"exact", "ex2", "fp16", "table256", "table16"}, "table16"));
+  knobs.push_back(state_knob("shading", "arithmetic of alpha and colour in the shader", {"fp32", "fp16"}, "fp16"));
+  knobs.push_back(state_knob("merging", "arithmetic of QM's merge", {"fp32", "fp16"}, ""));
+  knobs.push_back(state_knob("attributes", "format of what the shader loads of a splat", {"fp32", "fp16", "quantized"},
+                             "quantized"));
+  knobs.push_back(state_knob("export_format", "format of what the shader sends to CROP", {"fp32", "fp16"}, ""));
+  knobs.push_back(state_knob("alpha_max", "that the shader clamps alpha to", {"0.99", "0.999", "1"}, ""));
   knobs.push_back(preprocess_knob("depth_key_bits", "of the depths that splats are sorted by", {"32", "24", "16", "12"},
                                   "12", &PreprocessOptions::depth_key_bits));
   knobs.push_back(preprocess_knob("sh_degree", "highest degree of spherical harmonics evaluated", {"3", "2", "1", "0"},
@@ -111,8 +117,11 @@ std::vector<PrecisionKnob> make_knobs() {
   knobs.push_back(
       variant_knob("early_termination", "ZROP and CROP terminate opaque pixels", &Variant::early_termination));
   // The same rates, latencies and instructions whatever they are set to; and preprocessing is before the draw.
-  const std::vector<std::string> free{"blend_rounding", "termination_compare", "subpixel_bits",
-                                      "exponential",    "depth_key_bits",      "sh_degree"};
+  const std::vector<std::string> free{"blend_rounding", "termination_compare",
+                                      "subpixel_bits",  "exponential",
+                                      "shading",        "merging",
+                                      "export_format",  "alpha_max",
+                                      "depth_key_bits", "sh_degree"};
   for (PrecisionKnob& knob : knobs) knob.is_of_pipeline = !knob.is_preprocessing && knob.name != "pruning_threshold";
   for (PrecisionKnob& knob : knobs) knob.is_charged = std::find(free.begin(), free.end(), knob.name) == free.end();
   return knobs;

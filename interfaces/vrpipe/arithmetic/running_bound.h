@@ -26,9 +26,14 @@ struct FragmentBound {
 /// Takes a pixel's bound along with its fragments.
 class RunningBound {
  public:
-  /// @param merges  two fragments may be blended as one, in single precision, before they are blended into the target
-  RunningBound(ColorFormat format, BlendRounding rounding, bool merges)
-      : format_(format), rounding_(rounding), merges_(merges), arithmetic_((merges ? 8.0 : 4.0) / 16777216.0) {}
+  /// @param merges      two fragments may be blended as one before they are blended into the target
+  /// @param sent_error  relative, of what is sent to the target, a fragment or a merged pair, beyond single precision's
+  RunningBound(ColorFormat format, BlendRounding rounding, bool merges, double sent_error = 0)
+      : sent_error_(sent_error),
+        format_(format),
+        rounding_(rounding),
+        merges_(merges),
+        arithmetic_((merges ? 8.0 : 4.0) / 16777216.0) {}
 
   /// A fragment has been blended.
   /// @param fragment_alpha, fragment_color  the exact ones of the fragment: of its largest channel, premultiplied
@@ -37,6 +42,7 @@ class RunningBound {
                double pixel_alpha, double pixel_color, const FragmentBound& off = {}) const;
 
  private:
+  double sent_error_;
   ColorFormat format_;
   BlendRounding rounding_;
   bool merges_;
