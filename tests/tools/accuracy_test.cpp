@@ -179,7 +179,7 @@ TEST(PrecisionKnobs, AreAllThatTheHardwareChooses) {
             (std::vector<std::string>{"format", "blend_rounding", "termination_threshold", "termination_compare",
                                       "termination", "pruning_threshold", "subpixel_bits", "exponential", "shading",
                                       "merging", "attributes", "export_format", "alpha_max", "depth_key_bits",
-                                      "sh_degree", "splat_extent", "quad_merging", "early_termination"}));
+                                      "sh_degree", "dilation", "splat_extent", "quad_merging", "early_termination"}));
   // A choice that is added to a parameter belongs here too.
   for (const ParameterListing& unit : tools::all_parameters(nullptr)) {
     for (const Parameter* parameter : unit.parameters->parameters()) {
@@ -427,7 +427,7 @@ TEST_F(Accuracy, PrecisionHasEveryValueOfEveryKnob) {
     EXPECT_EQ(defaults, 1U) << knob.name;
   }
   EXPECT_EQ(i, ladder.size());
-  EXPECT_EQ(result["knobs_left_out"], (json{"depth_key_bits", "sh_degree"}));
+  EXPECT_EQ(result["knobs_left_out"], (json{"depth_key_bits", "sh_degree", "dilation"}));
   // The default's numbers are those of `run`.
   const json alone = json_of({"run", "--scene", "tiny.spl"})["runs"][0];
   EXPECT_EQ(by_default["result_hash"], alone["result_hash"]);
@@ -697,14 +697,15 @@ TEST_F(Accuracy, KnobsOfThePlotCanBeToldApart) {
     int red, green, blue;
   };
   std::map<std::string, Look> looks;
-  const std::regex pattern(R"re(<(circle|polygon) [^>]*fill="(#\w+)" stroke="(#\w+)"[^>]*><title>(\w+)=)re");
+  const std::regex pattern(R"re(<(circle|polygon) ([^>]*)fill="(#\w+)" stroke="(#\w+)"[^>]*><title>(\w+)=)re");
   for (std::sregex_iterator i(page.begin(), page.end(), pattern), end; i != end; ++i) {
-    const std::string color = (*i)[2] == "#fff" ? (*i)[3] : (*i)[2];
+    const std::string color = (*i)[3] == "#fff" ? (*i)[4] : (*i)[3];
     const unsigned long rgb = std::stoul(color.substr(1), nullptr, 16);
-    looks[(*i)[4]] = {(*i)[1], static_cast<int>(rgb >> 16), static_cast<int>(rgb >> 8 & 255),
-                      static_cast<int>(rgb & 255)};
+    const std::string corners = (*i)[2];  // a comma each
+    looks[(*i)[5]] = {(*i)[1].str() + std::to_string(std::count(corners.begin(), corners.end(), ',')),
+                      static_cast<int>(rgb >> 16), static_cast<int>(rgb >> 8 & 255), static_cast<int>(rgb & 255)};
   }
-  EXPECT_EQ(looks.size(), tools::precision_knobs().size() - 2) << "a draw list leaves out two";
+  EXPECT_EQ(looks.size(), tools::precision_knobs().size() - 3) << "a draw list leaves out three";
   for (const auto& [name, a] : looks) {
     for (const auto& [other, b] : looks) {
       if (name == other || a.shape != b.shape) continue;

@@ -135,8 +135,9 @@ Reference make_reference(const AccuracyJob& job, const Workload& workload,
   std::vector<DrawnPrecision> precisions;
   std::vector<std::size_t> runs;
   for (std::size_t i = 0; i < settings.size(); ++i) {
-    const auto precision =
-        workload.scene.draw_list ? drawn_precision({settings[i].request, {}}) : drawn_precision(settings[i]);
+    // Nothing is proved of other splats than the exact image's.
+    if (!workload.scene.draw_list && !(settings[i].preprocess == workload.options.exact())) continue;
+    const std::optional<DrawnPrecision> precision = drawn_precision(settings[i].request);
     if (!precision) continue;
     precisions.push_back(*precision);
     runs.push_back(i);
@@ -369,6 +370,30 @@ std::vector<PrecisionSettings> choose_values(const AccuracyJob& job, bool is_dra
       result.runs.back().name = knob.name + "=" + value;
     }
   }
+  if (job.quick || !result.base.variant.is_of_pipeline()) return settings;
+  for (const auto& values : precision_crossings()) {
+    PrecisionSettings crossed = settings.front();
+    std::vector<std::pair<std::string, std::string>> changed;
+    for (const auto& [name, value] : values) {
+      const auto knob = std::find_if(precision_knobs().begin(), precision_knobs().end(),
+                                     [&, name = name](const PrecisionKnob& each) { return each.name == name; });
+      if (knob->value(settings.front()) == value) continue;
+      knob->set(crossed, value);
+      changed.emplace_back(name, value);
+    }
+    if (!can_round(crossed)) continue;
+    std::size_t run = changed.empty() ? 0 : settings.size();
+    for (const PrecisionRow& row : result.precision) {
+      if (changed.size() == 1 && row.knob->name == changed.front().first && row.value == changed.front().second)
+        run = row.run;
+    }
+    result.crossed.push_back({values, run});
+    if (run < settings.size()) continue;
+    settings.push_back(std::move(crossed));
+    result.runs.emplace_back();
+    for (const auto& [name, value] : changed)
+      result.runs.back().name += (result.runs.back().name.empty() ? "" : ",") + name + "=" + value;
+  }
   return settings;
 }
 
@@ -376,6 +401,9 @@ void climb_precisions(const AccuracyJob& job, const Workload& workload, const st
                       const Reference& reference, const BatchPlace& place, AccuracyResult& result,
                       ProgressLine& progress) {
   const EnergyTable& energies = shipped_energies();
+  // The runs with one change come first.
+  std::size_t single = 1;
+  for (const PrecisionRow& row : result.precision) single = std::max(single, row.run + 1);
   std::vector<Task> tasks;
   for (std::size_t i = 0; i < settings.size(); ++i) {
     const PreprocessOptions options = settings[i].preprocess;
@@ -402,17 +430,81 @@ void climb_precisions(const AccuracyJob& job, const Workload& workload, const st
       run.picture = picture_of(image, picture_width);
       run.error_map = error_map(image, reference.image, picture_width);
     }
-    if (job.simulation.output) write_image(job, result, file_name(run.name), *simulated.image);
+    if (job.simulation.output && index < single) write_image(job, result, file_name(run.name), *simulated.image);
   });
 
   std::vector<TradeOff> trade_offs;
-  for (PrecisionRun& run : result.runs) {
+  for (PrecisionRun& run : result.runs)
     run.cycles_change_percent = error_percent(cycles_of(run.run), cycles_of(result.runs.front().run));
-    trade_offs.push_back({cycles_of(run.run).value_or(0), -run.error.psnr_db});
-  }
+  for (std::size_t i = 0; i < single; ++i)
+    trade_offs.push_back({cycles_of(result.runs[i].run).value_or(0), -result.runs[i].error.psnr_db});
   if (!result.runs.front().run.cycles) return;
   const std::vector<bool> front = pareto_front(trade_offs, precision_tolerance);
-  for (std::size_t i = 0; i < result.runs.size(); ++i) result.runs[i].on_front = front[i];
+  for (std::size_t i = 0; i < front.size(); ++i) result.runs[i].on_front = front[i];
+}
+
+/// Two near views, at `functional`: images depend on time in paper termination alone, and by no more than the threshold leaves.
+void measure_popping(const AccuracyJob& job, const Workload& workload, const std::vector<PrecisionSettings>& settings,
+                     const ShownImage& reference, const BatchPlace& place, AccuracyResult& result,
+                     ProgressLine& progress) {
+  if (workload.scene.draw_list || job.quick || !result.base.variant.is_of_pipeline()) return;
+  const std::shared_ptr<const Draw> exact_draw = workload.draw_with(workload.options.exact());
+  if (exact_draw->splats.empty()) return;
+  // Splats go from the nearest to the farthest.
+  const auto depth = static_cast<double>(exact_draw->splats[exact_draw->splats.size() / 2].depth);
+  Workload next = workload;
+  Camera& camera = next.scene.viewpoint.camera;
+  const double near = camera.near_plane;
+  const double far = camera.far_plane;
+  // By which window positions are divided there: camera z, of its window depth, and 1 without perspective.
+  const double divisor = camera.projection == Projection::perspective ? near * far / (far - depth * (far - near)) : 1.0;
+  for (int axis = 0; axis < 3; ++axis)
+    camera.eye[axis] += camera.rotation[static_cast<std::size_t>(axis)].x * divisor / camera.fx;
+  next.draw = std::make_shared<const Draw>(preprocess_scene(next.scene, next.options).draw);
+  const ShownImage next_reference =
+      shown(render_exactly(*next.draw_with(next.options.exact())), job.simulation.background);
+
+  std::vector<Task> tasks;
+  const auto compare_views = [&](std::size_t run) {
+    result.popping.push_back({result.runs[run].name});
+    PrecisionSettings chosen = settings[run];
+    chosen.request.fidelity = Fidelity::functional;
+    for (const Workload* const view : {&workload, static_cast<const Workload*>(&next)}) {
+      tasks.push_back(
+          {result.popping.back().run, chosen.request, [view, options = chosen.preprocess](const RunRequest& own) {
+             return frame_of(own, view->draw_with(options));
+           }});
+    }
+  };
+  compare_views(0);
+  const std::vector<std::string> knobs{"depth_key_bits", "format", "attributes", "shading"};
+  for (const PrecisionRow& row : result.precision) {
+    if (row.run != 0 && std::find(knobs.begin(), knobs.end(), row.knob->name) != knobs.end()) compare_views(row.run);
+  }
+  std::vector<ShownImage> images(tasks.size());
+  const unsigned processes = std::min(job.simulation.processes, static_cast<unsigned>(tasks.size()));
+  run_tasks(tasks, true, processes, place, progress, [&](std::size_t index, Simulated&& simulated) {
+    images[index] = shown(*simulated.image, job.simulation.background);
+  });
+  for (std::size_t i = 0; i < result.popping.size(); ++i) {
+    PoppingRow& row = result.popping[i];
+    std::size_t popped = 0;
+    double squares = 0;
+    for (std::size_t pixel = 0; pixel < reference.rgb.size() / 3; ++pixel) {
+      double largest = 0;
+      for (std::size_t value = 3 * pixel; value < 3 * pixel + 3; ++value) {
+        const double change = images[2 * i + 1].rgb[value] - images[2 * i].rgb[value];
+        const double off = change - (next_reference.rgb[value] - reference.rgb[value]);
+        squares += off * off;
+        largest = std::max(largest, std::fabs(off));
+      }
+      row.max_abs = std::max(row.max_abs, largest);
+      popped += largest > 1 / 255.0 ? 1 : 0;
+    }
+    const auto values = static_cast<double>(reference.rgb.size());
+    row.rms = std::sqrt(squares / values);
+    row.share_of_pixels = 3 * static_cast<double>(popped) / values;
+  }
 }
 
 }  // namespace
@@ -445,6 +537,8 @@ AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) 
   climb_stress(job, stress, {"stress ", climbs, values.size(), ladders.seconds()}, result, progress);
   climb_precisions(job, workload, values, reference, {"precision ", climbs + stress.size(), 0, ladders.seconds()},
                    result, progress);
+  measure_popping(job, workload, values, reference.image,
+                  {"near views ", climbs + stress.size() + values.size(), 0, ladders.seconds()}, result, progress);
   if (!workload.scene.draw_list) {
     for (PrecisionRun& run : result.runs)
       add_preprocess_parameters(job.simulation.preprocess_parameters, result.scene, run.run);

@@ -70,6 +70,21 @@ struct PrecisionRow {
   std::size_t run;  ///< 0 is the default
 };
 
+/// Values of several knobs at once, and the run that has them.
+struct CrossedRow {
+  std::vector<std::pair<std::string, std::string>> values;  ///< KNOB and VALUE
+  std::size_t run;
+};
+
+/// How an image changes from one view to the next, a step of the camera to the right by which what is at the middle depth moves by
+/// a pixel: how far that is from how the exact image changes. What is as wrong in both views is none of it; what pops is.
+struct PoppingRow {
+  std::string run;  ///< KNOB=VALUE, or "default"
+  double rms = 0;   ///< over all pixels and channels
+  double max_abs = 0;
+  double share_of_pixels = 0;  ///< of which a channel changes by over an 8-bit level too much or too little
+};
+
 /// A stress configuration of what was asked for: cycles at the most exact fidelity, and the errors of the others in the order
 /// of `fidelities()`.
 struct StressRow {
@@ -99,6 +114,8 @@ struct AccuracyResult {
   std::vector<FidelityLevel> fidelity;      ///< by variant, then from the least exact to the most
   std::vector<PrecisionRun> runs;           ///< the default first
   std::vector<PrecisionRow> precision;      ///< by knob
+  std::vector<CrossedRow> crossed;          ///< none in a quick look
+  std::vector<PoppingRow> popping;          ///< none in a quick look and of a draw list
   std::vector<std::string> knobs_left_out;  ///< those that mean nothing for a draw list
   std::vector<std::string> knobs_without_pipeline;  ///< those that mean nothing for what draws outside it
   std::vector<std::string> values_never_measured;   ///< KNOB=VALUE, of which nobody knows the measured rounding

@@ -112,16 +112,26 @@ std::vector<PrecisionKnob> make_knobs() {
                                   "12", &PreprocessOptions::depth_key_bits));
   knobs.push_back(preprocess_knob("sh_degree", "highest degree of spherical harmonics evaluated", {"3", "2", "1", "0"},
                                   "0", &PreprocessOptions::sh_degree));
+  knobs.push_back({"dilation",
+                   "--set preprocess.dilation=",
+                   "of projected covariances, pixels^2",
+                   {"0.1", "0.3", "0.5"},
+                   "",
+                   true,
+                   [](const PrecisionSettings& settings) { return fmt::format("{}", settings.preprocess.dilation); },
+                   [](PrecisionSettings& settings, const std::string& value) {
+                     PreprocessParameters parameters;
+                     parameters.set("dilation", value);
+                     settings.preprocess.dilation = parameters.options().dilation;
+                   }});
   knobs.push_back(state_knob("splat_extent", "what is rasterised for a splat", {"obb", "aabb", "three_sigma"}, ""));
   knobs.push_back(variant_knob("quad_merging", "TGC and QRU merge overlapping quads", &Variant::quad_merging));
   knobs.push_back(
       variant_knob("early_termination", "ZROP and CROP terminate opaque pixels", &Variant::early_termination));
   // The same rates, latencies and instructions whatever they are set to; and preprocessing is before the draw.
-  const std::vector<std::string> free{"blend_rounding", "termination_compare",
-                                      "subpixel_bits",  "exponential",
-                                      "shading",        "merging",
-                                      "export_format",  "alpha_max",
-                                      "depth_key_bits", "sh_degree"};
+  const std::vector<std::string> free{
+      "blend_rounding", "termination_compare", "subpixel_bits",  "exponential", "shading", "merging",
+      "export_format",  "alpha_max",           "depth_key_bits", "sh_degree",   "dilation"};
   for (PrecisionKnob& knob : knobs) knob.is_of_pipeline = !knob.is_preprocessing && knob.name != "pruning_threshold";
   for (PrecisionKnob& knob : knobs) knob.is_charged = std::find(free.begin(), free.end(), knob.name) == free.end();
   return knobs;
@@ -134,6 +144,25 @@ const std::vector<PrecisionKnob>& precision_knobs() {
   return knobs;
 }
 
+const std::vector<std::vector<std::pair<std::string, std::string>>>& precision_crossings() {
+  static const auto crossings = [] {
+    std::vector<std::vector<std::pair<std::string, std::string>>> all;
+    for (const char* format : {"rgba8", "rgba16f"}) {
+      for (const char* rounding : {"rne", "rtz"}) {
+        const auto add = [&](const char* merged, const char* merging) {
+          all.push_back(
+              {{"format", format}, {"blend_rounding", rounding}, {"quad_merging", merged}, {"merging", merging}});
+        };
+        add("off", "fp32");
+        add("on", "fp32");
+        add("on", "fp16");
+      }
+    }
+    return all;
+  }();
+  return crossings;
+}
+
 bool can_round(const PrecisionSettings& settings) {
   const auto& knobs = precision_knobs();
   const auto rounding =
@@ -141,8 +170,7 @@ bool can_round(const PrecisionSettings& settings) {
   return is_measured(settings.request.format) || rounding->value(settings) != "measured";
 }
 
-std::optional<DrawnPrecision> drawn_precision(const PrecisionSettings& settings) {
-  const RunRequest& request = settings.request;
+std::optional<DrawnPrecision> drawn_precision(const RunRequest& request) {
   const DrawState state = draw_state_of(request);
   const double visible = 1.0 / 255.0;
   const bool is_cut =
@@ -150,8 +178,8 @@ std::optional<DrawnPrecision> drawn_precision(const PrecisionSettings& settings)
   // Without pruning a larger box has more fragments.
   const bool is_wider =
       state.splat_extent != SplatExtent::oriented_box && static_cast<double>(state.pruning_threshold) < 0.999 * visible;
-  if (is_cut || is_wider || !(settings.preprocess == settings.preprocess.exact()) || !request.units.empty() ||
-      !request.variant.is_of_pipeline() || !request.variant.changed_units.empty()) {
+  if (is_cut || is_wider || !request.units.empty() || !request.variant.is_of_pipeline() ||
+      !request.variant.changed_units.empty()) {
     return std::nullopt;
   }
   DrawnPrecision drawn;

@@ -98,6 +98,24 @@ Json accuracy_json(const AccuracyResult& result) {
     stress_left_out.push_back({{"configuration", left_out.configuration}, {"reason", left_out.reason}});
   Json precision = Json::array();
   for (const PrecisionRow& row : result.precision) precision.push_back(precision_json(row, result.runs[row.run]));
+  Json crossed = Json::array();
+  for (const CrossedRow& row : result.crossed) {
+    const PrecisionRun& run = result.runs[row.run];
+    Json values = Json::object();
+    for (const auto& [knob, value] : row.values) values[knob] = value;
+    crossed.push_back({{"values", std::move(values)},
+                       {"psnr_db", decibels_json(run.error.psnr_db)},
+                       {"max_abs_error", run.error.max_abs_error},
+                       {"proved_max_abs_error", optional_json(run.proved_max_error)},
+                       {"pixels_stuck", run.pixels_stuck},
+                       {"cycles", cycles_json(run.run)},
+                       {"millijoules", range_json(run.millijoules)}});
+  }
+  Json popping = Json::array();
+  for (const PoppingRow& row : result.popping) {
+    popping.push_back(
+        {{"run", row.run}, {"rms", row.rms}, {"max_abs", row.max_abs}, {"share_over_8bit_level", row.share_of_pixels}});
+  }
   std::vector<std::string> left_out = result.knobs_left_out;
   left_out.insert(left_out.end(), result.knobs_without_pipeline.begin(), result.knobs_without_pipeline.end());
   Json json = head_json("vrpipe.accuracy/1", result.provenance, result.processes);
@@ -123,7 +141,9 @@ Json accuracy_json(const AccuracyResult& result) {
                {"fidelity", std::move(fidelity)},
                {"stress", std::move(stress)},
                {"stress_left_out", std::move(stress_left_out)},
-               {"precision", std::move(precision)}});
+               {"precision", std::move(precision)},
+               {"crossed", std::move(crossed)},
+               {"popping", std::move(popping)}});
   return json;
 }
 

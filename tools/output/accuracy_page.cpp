@@ -136,7 +136,7 @@ std::string precision_plot(const AccuracyResult& result) {
   for (std::size_t k = 0; k < precision_knobs().size(); ++k) {
     const PrecisionKnob& knob = precision_knobs()[k];
     const char* const color = fidelity_colors[k % fidelity_colors.size()];
-    constexpr Marker markers[] = {Marker::circle, Marker::square, Marker::diamond};
+    constexpr Marker markers[] = {Marker::circle, Marker::square, Marker::triangle};
     const Marker marker = markers[k / fidelity_colors.size()];
     bool seen = false;
     for (const PrecisionRow& row : result.precision) {
@@ -280,6 +280,8 @@ std::string accuracy_page(const AccuracyResult& result) {
   }
   text += word_list(precision_summary(result)) + table(precision_table(result));
   text += "<h3>" + fragments_title() + "</h3>\n" + fragments_plot(result) + table(fragments_table(result));
+  if (!result.crossed.empty()) text += "<h3>" + crossed_title() + "</h3>\n" + table(crossed_table(result));
+  if (!result.popping.empty()) text += "<h3>" + popping_title() + "</h3>\n" + table(popping_table(result));
 
   text += omitted_effects_section(result);
 

@@ -283,6 +283,39 @@ std::vector<const PrecisionRun*> runs_by_fragments(const AccuracyResult& result)
   return runs;
 }
 
+std::string crossed_title() { return "Of several choices at once"; }
+
+AccuracyTable crossed_table(const AccuracyResult& result) {
+  AccuracyTable table;
+  table.group_heading = "format, rounding";
+  table.heading = {"QM", "merging", "PSNR, dB", "max error", "proved", "stuck", "cycles"};
+  for (const CrossedRow& row : result.crossed) {
+    const PrecisionRun& run = result.runs[row.run];
+    table.rows.push_back({row.values[0].second + ", " + row.values[1].second,
+                          {row.values[2].second, row.values[2].second == "off" ? "" : row.values[3].second,
+                           decibels(run.error.psnr_db), fmt::format("{:.2g}", run.error.max_abs_error),
+                           run.proved_max_error ? two_digits_up(*run.proved_max_error) : "-", grouped(run.pixels_stuck),
+                           cycles_text(run.run)},
+                          false});
+  }
+  return table;
+}
+
+std::string popping_title() { return "Between two near views: errors of how the image changes"; }
+
+AccuracyTable popping_table(const AccuracyResult& result) {
+  AccuracyTable table;
+  table.group_heading = "views";
+  table.heading = {"run", "rms", "max", "over an 8-bit level, % of pixels"};
+  for (const PoppingRow& row : result.popping) {
+    table.rows.push_back({"a pixel apart at the middle depth",
+                          {row.run, fmt::format("{:.2g}", row.rms), fmt::format("{:.2g}", row.max_abs),
+                           fmt::format("{:.2f}", 100 * row.share_of_pixels)},
+                          false});
+  }
+  return table;
+}
+
 std::string fragments_title() { return "Errors by the fragments of a pixel"; }
 
 AccuracyTable fragments_table(const AccuracyResult& result) {
@@ -485,6 +518,10 @@ std::string accuracy_text(const AccuracyResult& result, const TextStyle& style) 
           "\n";
   text +=
       "\n" + style.bold(fragments_title()) + "\n\n" + text_of(fragments_table(result), {0, 1, 2, 3, 4}, style) + "\n";
+  if (!result.crossed.empty())
+    text += style.bold(crossed_title()) + "\n\n" + text_of(crossed_table(result), {0, 1, 2, 3, 4, 5, 6}, style) + "\n";
+  if (!result.popping.empty())
+    text += style.bold(popping_title()) + "\n\n" + text_of(popping_table(result), {0, 1, 2, 3}, style) + "\n";
   if (const std::string verdict = precision_verdict(result); !verdict.empty()) text += verdict + "\n";
   for (const std::string& line : precision_summary(result)) text += line + "\n";
   if (result.runs.front().run.cycles) text += precision_definition() + "\n";
@@ -501,6 +538,8 @@ std::string accuracy_markdown(const AccuracyResult& result) {
   for (const std::string& line : stress_notes(result)) text += "* " + line + "\n";
   text += (result.stress_left_out.empty() ? "" : "\n") + markdown(precision_table(result)) + "\n";
   text += fragments_title() + ":\n\n" + markdown(fragments_table(result)) + "\n";
+  if (!result.crossed.empty()) text += crossed_title() + ":\n\n" + markdown(crossed_table(result)) + "\n";
+  if (!result.popping.empty()) text += popping_title() + ":\n\n" + markdown(popping_table(result)) + "\n";
   for (const std::string& line : precision_summary(result)) text += "* " + line + "\n";
   return text;
 }
