@@ -447,7 +447,7 @@ void climb_precisions(const AccuracyJob& job, const Workload& workload, const st
 void measure_popping(const AccuracyJob& job, const Workload& workload, const std::vector<PrecisionSettings>& settings,
                      const ShownImage& reference, const BatchPlace& place, AccuracyResult& result,
                      ProgressLine& progress) {
-  if (workload.scene.draw_list || job.quick || !result.base.variant.is_of_pipeline()) return;
+  if (workload.scene.draw_list || !result.base.variant.is_of_pipeline()) return;
   const std::shared_ptr<const Draw> exact_draw = workload.draw_with(workload.options.exact());
   if (exact_draw->splats.empty()) return;
   // Splats go from the nearest to the farthest.

@@ -115,7 +115,7 @@ struct AccuracyResult {
   std::vector<PrecisionRun> runs;           ///< the default first
   std::vector<PrecisionRow> precision;      ///< by knob
   std::vector<CrossedRow> crossed;          ///< none in a quick look
-  std::vector<PoppingRow> popping;          ///< none in a quick look and of a draw list
+  std::vector<PoppingRow> popping;          ///< none of a draw list
   std::vector<std::string> knobs_left_out;  ///< those that mean nothing for a draw list
   std::vector<std::string> knobs_without_pipeline;  ///< those that mean nothing for what draws outside it
   std::vector<std::string> values_never_measured;   ///< KNOB=VALUE, of which nobody knows the measured rounding
