@@ -11,15 +11,17 @@ const char* name_of(ColorFormat format) {
     case ColorFormat::rgba8: return "rgba8";
     case ColorFormat::rgba16f: return "rgba16f";
     case ColorFormat::rgba32f: return "rgba32f";
+    case ColorFormat::rgba16: return "rgba16";
+    case ColorFormat::srgb8: return "srgb8";
   }
   return "";
 }
 
 ColorFormat color_format_named(const std::string& name) {
-  for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
+  for (const ColorFormat format : color_formats) {
     if (name == name_of(format)) return format;
   }
-  const std::string remedy = "use rgba8, rgba16f or rgba32f";
+  const std::string remedy = "use rgba8, srgb8, rgba16f, rgba16 or rgba32f";
   if (name == "rgb10a2") {
     throw UserError("cannot render to rgb10a2", "--format", "its 2-bit alpha cannot accumulate front to back", remedy);
   }
@@ -27,6 +29,12 @@ ColorFormat color_format_named(const std::string& name) {
     throw UserError("cannot render to r11g11b10f", "--format", "it has no alpha to blend front to back with", remedy);
   }
   throw UserError("unknown format '" + name + "'", "--format", "no such colour format", remedy);
+}
+
+void check_rounding(ColorFormat format, BlendRounding rounding) {
+  if (rounding != BlendRounding::measured || is_measured(format)) return;
+  throw UserError(std::string("cannot round to ") + name_of(format) + " as measured", "state.blend_rounding, --format",
+                  "no GPU's blender into that format has been measured", "use rne or rtz, or another format");
 }
 
 namespace {
@@ -110,16 +118,20 @@ QuadColor blend_as_specified(const QuadColor& destination, const QuadColor& sour
 BlendFunction blend_function(ColorFormat format, BlendRounding rounding) {
   using F = ColorFormat;
   using R = BlendRounding;
+  check_rounding(format, rounding);
+  const bool truncates = rounding == R::rtz;
   switch (format) {
     case F::rgba8:
       if (rounding == R::measured) return measured_unorm8;
-      return rounding == R::rtz ? blend_as_specified<F::rgba8, R::rtz> : blend_as_specified<F::rgba8, R::rne>;
+      return truncates ? blend_as_specified<F::rgba8, R::rtz> : blend_as_specified<F::rgba8, R::rne>;
     case F::rgba16f:
       if (rounding == R::measured) return measured_half;
-      return rounding == R::rtz ? blend_as_specified<F::rgba16f, R::rtz> : blend_as_specified<F::rgba16f, R::rne>;
+      return truncates ? blend_as_specified<F::rgba16f, R::rtz> : blend_as_specified<F::rgba16f, R::rne>;
     case F::rgba32f:
       if (rounding == R::measured) return measured_float;
       return blend_as_specified<F::rgba32f, R::rne>;
+    case F::rgba16: return truncates ? blend_as_specified<F::rgba16, R::rtz> : blend_as_specified<F::rgba16, R::rne>;
+    case F::srgb8: return truncates ? blend_as_specified<F::srgb8, R::rtz> : blend_as_specified<F::srgb8, R::rne>;
   }
   return nullptr;
 }

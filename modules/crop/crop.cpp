@@ -309,6 +309,10 @@ template class ColorRop<ColorFormat::rgba16f, BlendRounding::measured>;
 template class ColorRop<ColorFormat::rgba32f, BlendRounding::rne>;
 template class ColorRop<ColorFormat::rgba32f, BlendRounding::rtz>;
 template class ColorRop<ColorFormat::rgba32f, BlendRounding::measured>;
+template class ColorRop<ColorFormat::rgba16, BlendRounding::rne>;
+template class ColorRop<ColorFormat::rgba16, BlendRounding::rtz>;
+template class ColorRop<ColorFormat::srgb8, BlendRounding::rne>;
+template class ColorRop<ColorFormat::srgb8, BlendRounding::rtz>;
 
 namespace {
 const SlotRegistrar crop_slot{
@@ -367,7 +371,7 @@ const EffectRegistrar saturation_effect{
      {},
      [](const EffectQuestion& asked) {
        if (asked.context.format == ColorFormat::rgba32f) return EffectDecision::omit("RGBA32F has no largest colour");
-       const double largest = asked.context.format == ColorFormat::rgba8 ? 1.0 : static_cast<double>(half_max);
+       const auto largest = static_cast<double>(largest_color_of(asked.context.format));
        const auto here = static_cast<double>(asked.facts.largest_color);
        const std::string numbers = fmt::format("colours up to {:.3g}; the format's largest is {:g}", here, largest);
        return here <= largest / 16 ? EffectDecision::omit(numbers) : EffectDecision::keep(numbers);

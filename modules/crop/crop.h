@@ -40,9 +40,7 @@ class ColorRop : public CropBehaviour {
   Counter colors_saturated{*this, "colors_saturated", "fragments", "that took a colour beyond the format's largest"};
 
  private:
-  static constexpr float largest_color = Format == ColorFormat::rgba8     ? 1.0F
-                                         : Format == ColorFormat::rgba16f ? half_max
-                                                                          : std::numeric_limits<float>::infinity();
+  static constexpr float largest_color = largest_color_of(Format);
 
   /// What was done, to be counted for a draw.
   struct Tally {
@@ -112,6 +110,8 @@ class CropMaker {
       case ColorFormat::rgba8: return make_for<ColorFormat::rgba8>(parameters, context);
       case ColorFormat::rgba16f: return make_for<ColorFormat::rgba16f>(parameters, context);
       case ColorFormat::rgba32f: return make_for<ColorFormat::rgba32f>(parameters, context);
+      case ColorFormat::rgba16: return make_for<ColorFormat::rgba16>(parameters, context);
+      case ColorFormat::srgb8: return make_for<ColorFormat::srgb8>(parameters, context);
     }
     return nullptr;
   }
@@ -129,10 +129,13 @@ class CropMaker {
  private:
   template <ColorFormat Format>
   static std::unique_ptr<Behaviour> make_for(const CropParameters& parameters, const RenderContext& context) {
+    check_rounding(Format, context.precision.blend_rounding);
     switch (context.precision.blend_rounding) {
       case BlendRounding::rne: return std::make_unique<Rop<Format, BlendRounding::rne>>(parameters, context);
       case BlendRounding::rtz: return std::make_unique<Rop<Format, BlendRounding::rtz>>(parameters, context);
-      case BlendRounding::measured: return std::make_unique<Rop<Format, BlendRounding::measured>>(parameters, context);
+      case BlendRounding::measured:
+        if constexpr (is_measured(Format))
+          return std::make_unique<Rop<Format, BlendRounding::measured>>(parameters, context);
     }
     return nullptr;
   }

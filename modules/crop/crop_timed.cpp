@@ -335,14 +335,21 @@ class TimedCrop : public TimedUnit {
       if (outcomes[i].terminated == 0) continue;
       const Cycle blended = at.of_part(i - from, to - from);
       if (beat.count > 0 && (blended != cycle || beat.count == TerminationBeat::capacity)) {
-        out_.send(beat, cycle);
+        send(beat, cycle);
         beat.count = 0;
       }
       cycle = blended;
       beat.signals[beat.count++] = {warp.tile, warp.position[i], outcomes[i].terminated,
                                     context_.draw(warp.draw[i]).epoch};
     }
-    if (beat.count > 0) out_.send(beat, cycle);
+    if (beat.count > 0) send(beat, cycle);
+  }
+  /// With those of the warp before that are of the same cycle.
+  void send(const TerminationBeat& beat, Cycle cycle) {
+    const bool joins = cycle == signalled_at_ && signalled_ + beat.count <= TerminationBeat::capacity;
+    out_.send(beat, joins ? std::max(cycle, out_.last()) : cycle, joins ? 0 : 1);
+    signalled_ = beat.count + (joins ? signalled_ : 0);
+    signalled_at_ = cycle;
   }
 
   struct Move {
@@ -384,7 +391,9 @@ class TimedCrop : public TimedUnit {
   };
   /// The cache, where the line that goes is not always the one whose last use is longest ago, and so is free first.
   SectoredCache* pins_ = nullptr;
-  Ring<Pinned> pinned_;  ///< by queued quads
+  Ring<Pinned> pinned_;     ///< by queued quads
+  unsigned signalled_ = 0;  ///< quads, in the last cycle with any
+  Cycle signalled_at_ = never;
   Cycle end_ = never;
   bool any_blended_ = false;
   StatisticSet more_cache_statistics_{*this, "cache"};

@@ -51,6 +51,7 @@ class TimedProp : public TimedUnit {
         there_(time_.quads_per_cycle),
         back_(time_.quads_per_cycle),
         color_(time_.color_rate.items),
+        beats_a_cycle_(ColorBeat::in_a_cycle(time_.color_rate)),
         late_(time_.quads_per_cycle) {
     out_test_.set_pipeline(time_.latency_cycles - 1, 1);
     out_survivors_.set_pipeline(time_.latency_cycles - 1, 1);
@@ -143,8 +144,11 @@ class TimedProp : public TimedUnit {
     charge(UnitState::blocked, out_color_.last());
     Cycle left = 0;
     if (warp.count > 0) {
-      const bool joins = color_.taken_of(std::max(from, color_.next())) > 0;
-      if (!joins) {
+      // Quads of one cycle go together, also those of several warps, as many as a beat holds.
+      const auto before =
+          static_cast<unsigned>(color_.taken_of(std::max(from, color_.next())) / time_.color_rate.cycles);
+      const bool joins = beats_a_cycle_ == 1 ? before > 0 : before % ColorBeat::capacity > 0;
+      if (before == 0) {
         charge(UnitState::starved, from);
         charge(UnitState::blocked, out_color_.room_from());
         color_.hold(out_color_.room_from());
@@ -153,9 +157,10 @@ class TimedProp : public TimedUnit {
       charge(UnitState::starved, at.first);
       charge(UnitState::busy, at.last + 1);
       did(PropWork::color, warp.count, at.first, at.last + 1);
-      // Quads of one cycle go together, also those of several warps.
-      const auto cycles = static_cast<unsigned>(at.last - at.first) + (joins ? 0 : 1);
-      left = out_color_.send({&warp}, at, std::min<unsigned>(warp.count, cycles), joins).last;
+      const unsigned beats = beats_a_cycle_ == 1
+                                 ? static_cast<unsigned>(at.last - at.first) + 1
+                                 : (before % ColorBeat::capacity + warp.count - 1) / ColorBeat::capacity + 1;
+      left = out_color_.send({&warp}, at, std::min<unsigned>(warp.count, beats - (joins ? 1 : 0)), joins).last;
       charge(UnitState::blocked, left);
       color_.postpone(left);
     } else {
@@ -233,6 +238,7 @@ class TimedProp : public TimedUnit {
   BatchServer there_;     ///< to the tests, or past them
   BatchServer back_;      ///< from the tests
   ThroughputPort color_;  ///< in parts of a cycle and of a quad: a cycle passes `color_rate.items`
+  const unsigned beats_a_cycle_;
   // In a frame with late tests:
   IssuePort late_;
   ReorderBuffer::Waiting in_turn_;  ///< the warp whose turn it is to go either way; none without a warp

@@ -19,7 +19,6 @@
 namespace vrpipe {
 
 namespace {
-constexpr float alpha_max = 0.99F;
 constexpr float half_log2_e = 0.72134752F;
 // Of the axes' determinant, px^2: below it the inverse overflows, and flushing denormals would decide.
 constexpr float smallest_determinant = 1e-30F;
@@ -38,6 +37,36 @@ struct Samples {
   }
 };
 const Samples samples;
+
+/// Of a value that is computed with, or kept, in a format.
+template <NumberFormat Format, class Floats>
+inline Floats in_format(Floats value) {
+  return Format == NumberFormat::fp16 ? round_to_half(value) : value;
+}
+template <NumberFormat Format>
+inline ChannelPairs in_format(const ChannelPairs& color) {
+  return {in_format<Format>(color.red_green), in_format<Format>(color.blue_alpha)};
+}
+
+/// Two fragments as one: in binary16 1 - alpha is rounded, then each multiply-add once.
+template <NumberFormat Format>
+inline ChannelPairs merged_in_format(const ChannelPairs& front, const ChannelPairs& back) {
+  if constexpr (Format == NumberFormat::fp32) {
+    return blend_front_to_back(front, back);
+  } else {
+    const ChannelPairs first = in_format<Format>(front);
+    const ChannelPairs second = in_format<Format>(back);
+    const LanePair transmittance = in_format<Format>(second_twice(1.0F - first.blue_alpha));
+    return {in_format<Format>(first.red_green + transmittance * second.red_green),
+            in_format<Format>(first.blue_alpha + transmittance * second.blue_alpha)};
+  }
+}
+
+/// Of the bytes of attributes in single precision, 10 values: those that are left of 40 of them.
+std::uint32_t attribute_bytes_in(AttributeFormat format, std::uint32_t bytes) {
+  const std::uint32_t of_40 = format == AttributeFormat::fp32 ? 40 : format == AttributeFormat::fp16 ? 24 : 20;
+  return (bytes * of_40 + 39) / 40;
+}
 
 /// What a colour target of 16 bits can hold; NaN gives 0.
 float clamp_color(float value) { return std::min(std::max(0.0F, value), half_max); }
@@ -61,7 +90,15 @@ SplatShader::SplatShader(const Parameters& parameters, const RenderContext& cont
       pairing_gate_(context, "qru.pairing"),
       several_draws_(several_draws_gate_.is_active() ||
                      (context.frame->draws().size() > 1 && several_draws_gate_.enter())),
+      alpha_max_(context.precision.alpha_max),
       mesh_(context) {
+  const DevicePrecision& precision = context.precision;
+  if (precision.shading == NumberFormat::fp16) {
+    alpha_max_ = round_to_half(alpha_max_);
+    choose_merging<NumberFormat::fp16>(precision.merging, precision.export_format);
+  } else {
+    choose_merging<NumberFormat::fp32>(precision.merging, precision.export_format);
+  }
   timing_.hand_over = {parameters.warp_launch_cycles.thousandths(), parameters.visit_launch_cycles.thousandths(),
                        parameters.discard_launch_cycles.thousandths(), parameters.discard_warp_cycles.thousandths()};
   timing_.cores = parameters.cores;
@@ -78,7 +115,7 @@ SplatShader::SplatShader(const Parameters& parameters, const RenderContext& cont
   timing_.vertex_warps = parameters.vertex_warps;
   timing_.warps_to_one_core = parameters.warps_to_one_core;
   AttributeFetch& fetch = timing_.fetch;
-  fetch.attribute_bytes = parameters.attribute_bytes;
+  fetch.attribute_bytes = attribute_bytes_in(precision.attributes, parameters.attribute_bytes);
   fetch.core_bytes = parameters.memory_bytes_per_cycle;
   fetch.buffer_bytes = parameters.attribute_buffer_bytes;
   fetch.attribute_writes = parameters.attribute_writes;
@@ -118,6 +155,19 @@ void SplatShader::set_up(Attributes& attributes, const Quad& quad) {
                 -splat.ay * scale,
                 splat.ax * scale,
                 splat.opacity};
+  const DevicePrecision& precision = context_.precision;
+  const bool computes_in_half = precision.shading == NumberFormat::fp16;
+  if (precision.attributes == AttributeFormat::fp32 && !computes_in_half) return;
+  for (float* const value : {&attributes.m00, &attributes.m01, &attributes.m10, &attributes.m11})
+    *value = round_to_half(*value);
+  const auto kept = [&](float value) {
+    if (precision.attributes == AttributeFormat::quantized) value = round_to_unorm<255>(splat_lanes(value))[0];
+    return precision.attributes == AttributeFormat::fp16 || computes_in_half ? round_to_half(value) : value;
+  };
+  attributes.opacity = kept(attributes.opacity);
+  attributes.red_green =
+      join(splat_lanes(kept(first_of(attributes.red_green)[0])), splat_lanes(kept(second_of(attributes.red_green)[0])));
+  attributes.blue_one = join(splat_lanes(kept(first_of(attributes.blue_one)[0])), splat_lanes(1.0F));
 }
 
 const SplatShader::Attributes& SplatShader::attributes_of(AttributeTable& table, const Quad& quad) {
@@ -126,14 +176,17 @@ const SplatShader::Attributes& SplatShader::attributes_of(AttributeTable& table,
   return attributes;
 }
 
-template <Exponential Kind>
-inline LanePair SplatShader::alpha_at(LanePair x, LanePair y, const Shape& splats) {
-  const LanePair dx = x - splats.cx;
-  const LanePair dy = y - splats.cy;
-  const LanePair u = dx * splats.m00 + dy * splats.m01;
-  const LanePair v = dx * splats.m10 + dy * splats.m11;
-  const LanePair squared = u * u + v * v;
-  const LanePair alpha = shader_exp2<Kind>(squared * -half_log2_e) * splats.opacity;
+template <Exponential Kind, NumberFormat Format>
+inline LanePair SplatShader::alpha_at(LanePair x, LanePair y, const Shape& splats, float alpha_max) {
+  // In binary16 the second product is of a fused multiply-add: 22 bits, which single precision holds.
+  const auto rounded = [](LanePair value) { return in_format<Format>(value); };
+  const LanePair dx = rounded(x - splats.cx);
+  const LanePair dy = rounded(y - splats.cy);
+  const LanePair u = rounded(rounded(dx * splats.m00) + dy * splats.m01);
+  const LanePair v = rounded(rounded(dx * splats.m10) + dy * splats.m11);
+  const LanePair squared = rounded(rounded(u * u) + v * v);
+  const LanePair power = rounded(squared * in_format<Format>(LanePair{} - half_log2_e));
+  const LanePair alpha = rounded(rounded(shader_exp2<Kind>(power)) * splats.opacity);
   // So written that NaN stays NaN, and the pruning test prunes it.
   return select(alpha > alpha_max, LanePair{} + alpha_max, alpha);
 }
@@ -160,7 +213,29 @@ inline void SplatShader::count(const Warp& warp, const Threads& threads) {
   }
 }
 
-void SplatShader::shade(const Warp& warp, ShadedWarp& out) {
+template <NumberFormat Export>
+inline void SplatShader::LiveColors<Export>::put(unsigned, LaneMask live, const ChannelPairs& color) {
+  store(in_format<Export>(color), *next);
+  next += live != 0;
+}
+
+void SplatShader::shade(const Warp& warp, ShadedWarp& out) { (this->*shade_in_)(warp, out); }
+
+template <NumberFormat Shading>
+void SplatShader::choose_merging(NumberFormat merging, NumberFormat exports) {
+  constexpr NumberFormat single = NumberFormat::fp32;
+  constexpr NumberFormat half = NumberFormat::fp16;
+  if (merging == half) {
+    shade_in_ =
+        exports == half ? &SplatShader::shade_in<Shading, half, half> : &SplatShader::shade_in<Shading, half, single>;
+  } else {
+    shade_in_ = exports == half ? &SplatShader::shade_in<Shading, single, half>
+                                : &SplatShader::shade_in<Shading, single, single>;
+  }
+}
+
+template <NumberFormat Shading, NumberFormat Merging, NumberFormat Export>
+void SplatShader::shade_in(const Warp& warp, ShadedWarp& out) {
   ++fragment_warps;
   out.tile = warp.tile;
   out.sequence = warp.sequence;
@@ -170,10 +245,10 @@ void SplatShader::shade(const Warp& warp, ShadedWarp& out) {
   Threads threads;
   threads.covered = lanes.covered();
   if (warp.merge_pairs != 0 && pairing_gate_.enter()) {
-    shade_pairs(warp, threads, out);
+    shade_pairs<Shading, Merging, Export>(warp, threads, out);
   } else {
-    LiveColors colors{out.color.data()};
-    shade_quads(warp, threads, colors);
+    LiveColors<Export> colors{out.color.data()};
+    shade_quads<Shading>(warp, threads, colors);
     lanes.put_live(threads.live, several_draws_, out);
   }
   if (__builtin_expect(context_.hands_on_coverage, 0)) add_pruned(warp, threads, out);
@@ -181,17 +256,17 @@ void SplatShader::shade(const Warp& warp, ShadedWarp& out) {
   count(warp, threads);
 }
 
-template <class Colors>
+template <NumberFormat Shading, class Colors>
 [[gnu::always_inline]] inline void SplatShader::shade_quads(const Warp& warp, Threads& threads, Colors& colors) {
   const FragmentShader shader = context_.state(warp.quads[0].draw).shader;  // all quads' state
   if (__builtin_expect(shader == FragmentShader::alpha_threshold, 0)) return shade_by_alpha(warp, threads, colors);
   if (__builtin_expect(shader != FragmentShader::splat, 0)) return shade_mesh(warp, threads, colors);
   switch (context_.precision.exponential) {
-    case Exponential::exact: return shade_splats<Exponential::exact>(warp, threads, colors);
-    case Exponential::ex2: return shade_splats<Exponential::ex2>(warp, threads, colors);
-    case Exponential::fp16: return shade_splats<Exponential::fp16>(warp, threads, colors);
-    case Exponential::table256: return shade_splats<Exponential::table256>(warp, threads, colors);
-    case Exponential::table16: return shade_splats<Exponential::table16>(warp, threads, colors);
+    case Exponential::exact: return shade_splats<Exponential::exact, Shading>(warp, threads, colors);
+    case Exponential::ex2: return shade_splats<Exponential::ex2, Shading>(warp, threads, colors);
+    case Exponential::fp16: return shade_splats<Exponential::fp16, Shading>(warp, threads, colors);
+    case Exponential::table256: return shade_splats<Exponential::table256, Shading>(warp, threads, colors);
+    case Exponential::table16: return shade_splats<Exponential::table16, Shading>(warp, threads, colors);
   }
 }
 
@@ -223,9 +298,11 @@ template <class Colors>
   }
 }
 
-template <Exponential Kind, class Colors>
+template <Exponential Kind, NumberFormat Shading, class Colors>
 [[gnu::noinline]] void SplatShader::shade_splats(const Warp& warp, Threads& threads, Colors& colors) {
-  const float pruning_threshold = context_.state(warp.quads[0].draw).pruning_threshold;  // all quads' state
+  // All quads' state. Alphas in binary16 are compared with a threshold in binary16: 1/255 is less there than in single precision.
+  const float threshold = context_.state(warp.quads[0].draw).pruning_threshold;
+  const float pruning_threshold = Shading == NumberFormat::fp16 ? round_to_half(threshold) : threshold;
   // Sample positions are sums of small integers and halves: exact.
   const auto x = static_cast<float>(warp.tile.x * screen_tile_pixels);
   const auto y = static_cast<float>(warp.tile.y * screen_tile_pixels);
@@ -241,17 +318,17 @@ template <Exponential Kind, class Colors>
     const Attributes& of_second = is_same ? of_first : attributes_of(attributes_of_second_, second);
     const Samples::OfQuad& at_first = samples.of[first.position];
     const Samples::OfQuad& at_second = samples.of[second.position];
-    const LanePair alpha = alpha_at<Kind>(x + join(at_first.x, at_second.x), y + join(at_first.y, at_second.y),
-                                          is_same ? Shape(of_first) : Shape(of_first, of_second));
+    const LanePair alpha = alpha_at<Kind, Shading>(x + join(at_first.x, at_second.x), y + join(at_first.y, at_second.y),
+                                                   is_same ? Shape(of_first) : Shape(of_first, of_second), alpha_max_);
     const LanePairBits kept = (alpha >= pruning_threshold) & expand_mask_pair(covered >> (4 * i));
     const LanePair visible = floats_of<LanePair>(bits_of(alpha) & kept);
     const unsigned live = sign_mask(kept);
     const LanePair to_first = first_twice(visible);
     const LanePair to_second = second_twice(visible);
     colors.put(i, static_cast<LaneMask>(live & all_lanes),
-               {to_first * of_first.red_green, to_first * of_first.blue_one});
+               in_format<Shading>(ChannelPairs{to_first * of_first.red_green, to_first * of_first.blue_one}));
     colors.put(i + 1, static_cast<LaneMask>(live >> 4U),
-               {to_second * of_second.red_green, to_second * of_second.blue_one});
+               in_format<Shading>(ChannelPairs{to_second * of_second.red_green, to_second * of_second.blue_one}));
     live_of_warp |= live << (4 * i);
   }
   threads.live = live_of_warp;
@@ -265,14 +342,15 @@ void SplatShader::tell_merged(const Warp& warp, std::uint32_t threads) const {
   }
 }
 
+template <NumberFormat Shading, NumberFormat Merging, NumberFormat Export>
 void SplatShader::shade_pairs(const Warp& warp, Threads& threads, ShadedWarp& out) {
   // First the colours of all, then what becomes of them: a branch on that waits for the exponential.
   AllColors colors;
-  shade_quads(warp, threads, colors);
+  shade_quads<Shading>(warp, threads, colors);
   unsigned count = 0;
   // Written whether the quad lives or not, since a branch would be mispredicted too often.
   const auto put = [&](const Quad& quad, LaneMask live, const ChannelPairs& color) {
-    store(color, out.color[count]);
+    store(in_format<Export>(color), out.color[count]);
     out.position[count] = quad.position;
     out.live[count] = live;
     out.first_primitive[count] = out.last_primitive[count] = primitive_order(quad);
@@ -287,7 +365,7 @@ void SplatShader::shade_pairs(const Warp& warp, Threads& threads, ShadedWarp& ou
     const ChannelPairs& of_front = colors.of_quad[i];
     const ChannelPairs& of_back = colors.of_quad[i + 1];
     if ((warp.merge_pairs >> (i / 2) & 1U) != 0 && front != 0 && back != 0) {
-      put(warp.quads[i], static_cast<LaneMask>(front | back), blend_front_to_back(of_front, of_back));
+      put(warp.quads[i], static_cast<LaneMask>(front | back), merged_in_format<Merging>(of_front, of_back));
       out.last_primitive[count - 1] = primitive_order(warp.quads[i + 1]);
       threads.merged |= (unsigned{front} & back) << (4 * i + 4);
       threads.merged_quads |= 1U << (4 * i + 4);

@@ -234,38 +234,42 @@ class SplatShader : public SmBehaviour {
     std::uint32_t merged = 0;        ///< of back quads that their fronts take up, where both are live
     std::uint32_t merged_quads = 0;  ///< the first of each such quad
   };
-  // What takes the colours of a warp's quads, in their order: those of all, or, one behind the other, of those that live. Behind the
-  // last may come one that is dead.
+  // What takes the colours of a warp's quads, in their order: those of all, or, one behind the other, of those that live, as they
+  // are exported. Behind the last may come one that is dead.
   struct AllColors {
     void put(unsigned index, LaneMask, const ChannelPairs& color) { of_quad[index] = color; }
     ChannelPairs of_quad[quads_per_warp];
   };
+  template <NumberFormat Export>
   struct LiveColors {
     /// Written in any case, since a branch would be mispredicted too often.
-    void put(unsigned, LaneMask live, const ChannelPairs& color) {
-      store(color, *next);
-      next += live != 0;
-    }
+    void put(unsigned, LaneMask live, const ChannelPairs& color);
     QuadColor* next;
   };
+  /// Chosen by the precision of the hardware.
+  template <NumberFormat Shading>
+  void choose_merging(NumberFormat merging, NumberFormat exports);
+  template <NumberFormat Shading, NumberFormat Merging, NumberFormat Export>
+  void shade_in(const Warp& warp, ShadedWarp& out);
   /// Says as well which threads live.
-  template <class Colors>
+  template <NumberFormat Shading, class Colors>
   void shade_quads(const Warp& warp, Threads& threads, Colors& colors);
-  template <Exponential Kind, class Colors>
+  template <Exponential Kind, NumberFormat Shading, class Colors>
   void shade_splats(const Warp& warp, Threads& threads, Colors& colors);
   template <class Colors>
   void shade_mesh(const Warp& warp, Threads& threads, Colors& colors);
   template <class Colors>
   void shade_by_alpha(const Warp& warp, Threads& threads, Colors& colors);
   /// Shades a warp with pairs, merges them, and hands on what lives.
+  template <NumberFormat Shading, NumberFormat Merging, NumberFormat Export>
   [[gnu::noinline]] void shade_pairs(const Warp& warp, Threads& threads, ShadedWarp& out);
   /// Puts quads without a live fragment in their places among those that are handed on, and says what all cover.
   void add_pruned(const Warp& warp, const Threads& threads, ShadedWarp& out) const;
   void count(const Warp& warp, const Threads& threads);
   void tell_merged(const Warp& warp, std::uint32_t threads) const;
   /// Alpha at the samples of two quads.
-  template <Exponential Kind>
-  static LanePair alpha_at(LanePair x, LanePair y, const Shape& splats);
+  template <Exponential Kind, NumberFormat Format>
+  static LanePair alpha_at(LanePair x, LanePair y, const Shape& splats, float alpha_max);
 
   const RenderContext& context_;
   EffectGate several_draws_gate_;
@@ -273,6 +277,9 @@ class SplatShader : public SmBehaviour {
   EffectGate color_reads_gate_;
   EffectGate pairing_gate_;
   const bool several_draws_;
+  // What the precision calls for, chosen once.
+  void (SplatShader::*shade_in_)(const Warp&, ShadedWarp&) = nullptr;
+  float alpha_max_;
   TimingParameters timing_;
   /// Of the splats last set up, by the low bits of their number; two tables, so that the two quads' are there at once.
   AttributeTable attributes_of_first_;

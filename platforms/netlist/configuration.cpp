@@ -39,6 +39,19 @@ DrawState draw_state_from(const StateParameters& parameters) {
   return state;
 }
 
+DevicePrecision device_precision_from(const StateParameters& parameters) {
+  DevicePrecision precision;
+  precision.blend_rounding = static_cast<BlendRounding>(static_cast<unsigned>(parameters.blend_rounding));
+  precision.exponential = static_cast<Exponential>(static_cast<unsigned>(parameters.exponential));
+  precision.shading = static_cast<NumberFormat>(static_cast<unsigned>(parameters.shading));
+  precision.merging = static_cast<NumberFormat>(static_cast<unsigned>(parameters.merging));
+  precision.export_format = static_cast<NumberFormat>(static_cast<unsigned>(parameters.export_format));
+  precision.attributes = static_cast<AttributeFormat>(static_cast<unsigned>(parameters.attributes));
+  precision.alpha_max = static_cast<float>(static_cast<double>(parameters.alpha_max));
+  precision.subpixel_bits = parameters.subpixel_bits;
+  return precision;
+}
+
 }  // namespace
 
 namespace {
@@ -76,6 +89,12 @@ DepthFormat depth_format_of(const RunRequest& request) {
   return static_cast<DepthFormat>(static_cast<unsigned>(parameters.depth_format));
 }
 
+DevicePrecision device_precision_of(const RunRequest& request) {
+  StateParameters parameters;
+  set_all("state", parameters, request);
+  return device_precision_from(parameters);
+}
+
 Configuration::Configuration(const RunRequest& request, const Frame& frame)
     : request_(request), netlist_(gpcs_of(request)), elaborated_(netlist_.gpcs()) {
   // Of the program itself; a plugin's are reported when it is loaded.
@@ -104,10 +123,7 @@ Configuration::Configuration(const RunRequest& request, const Frame& frame)
   context.frame = std::move(drawn);
   context.format = request.format;
   context.termination = request.termination;
-  context.precision.blend_rounding =
-      static_cast<BlendRounding>(static_cast<unsigned>(state_parameters_.blend_rounding));
-  context.precision.exponential = static_cast<Exponential>(static_cast<unsigned>(state_parameters_.exponential));
-  context.precision.subpixel_bits = state_parameters_.subpixel_bits;
+  context.precision = device_precision_from(state_parameters_);
   context.clock_ps =
       std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::llround(1e6 / request.platform->frequency_mhz)));
   if (request.observers != nullptr) context.fragments = request.observers->of_fragments();

@@ -203,7 +203,7 @@ TEST_F(ColorRopTest, TellsWhetherAValueChanged) {
 
 // case B10
 TEST_F(ColorRopTest, AThousandQuadsOnOnePositionAreTheSequentialResult) {
-  for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
+  for (const ColorFormat format : color_formats) {
     context.format = format;
     make();
     QuadColor expected{};

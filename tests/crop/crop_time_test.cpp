@@ -27,7 +27,9 @@ Cycle blended(CropTime& time, const CropTime::Quad& quad, Cycle ready) {
 
 TEST(CropTime, QuadsGoAtTheRateOfTheirFormat) {
   const std::pair<ColorFormat, Cycle> eight_quads[] = {{ColorFormat::rgba8, 2},
+                                                       {ColorFormat::srgb8, 2},
                                                        {ColorFormat::rgba16f, 4},
+                                                       {ColorFormat::rgba16, 4},
                                                        {ColorFormat::rgba32f, 8}};
   for (const auto& [format, cycles] : eight_quads) {
     CropTime time = time_of({}, format);

@@ -1,4 +1,4 @@
-// Prints the result hash of a small built-in scene in every variant, both terminations and three fidelities, where shaders blend, and of frames in
+// Prints the result hash of a small built-in scene in every variant, both terminations and three fidelities, in every format, where shaders blend, and of frames in
 // software and by accelerators, as this build computes it; scripts/check compares the lines of builds by other compilers and at other levels of optimisation.
 #include <cstdio>
 #include <exception>
@@ -30,6 +30,19 @@ void print_hashes() {
         std::printf("%s %s %s %s\n", name_of(fidelity), name_of(termination), variant.name.c_str(),
                     result.result_hash.c_str());
       }
+    }
+  }
+  for (const ColorFormat format : color_formats) {
+    if (format == RunRequest().format) continue;
+    for (const char* rounding : {"rne", "rtz"}) {
+      RunRequest request;
+      request.platform = &platforms().front();
+      request.variant = variants().back();
+      request.fidelity = Fidelity::lt;
+      request.format = format;
+      request.settings = {{"state", "blend_rounding", rounding}};
+      fresh_simulation();
+      std::printf("%s %s %s\n", name_of(format), rounding, simulate(request, loaded.draw).result_hash.c_str());
     }
   }
   for (const Fidelity fidelity : {Fidelity::functional, Fidelity::lt, Fidelity::cycle}) {

@@ -29,7 +29,7 @@ TEST_P(Grid, LtIsNearBoundIsBelowAndStrictResultsAreTheSame) {
   const Draw draw = random_draw(64, 48, 800, 5);
   RunRequest request;
   request.platform = &platforms()[GetParam()];
-  for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
+  for (const ColorFormat format : color_formats) {
     for (const Termination termination : {Termination::paper, Termination::strict}) {
       for (const Variant& variant : variants()) {
         request.format = format;

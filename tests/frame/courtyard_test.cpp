@@ -46,7 +46,7 @@ unsigned wrong_channels(const RunResult& result, const testing::MixedReference& 
       const std::size_t index = std::size_t{y} * courtyard_size.width + x;
       const auto pixel = result.framebuffer.color.pixel(x, y);
       for (std::size_t channel = 0; channel < 4; ++channel) {
-        const double bound = reference.bound[index][channel == 3 ? 1 : 0] + slack;
+        const double bound = (channel == 3 ? reference.bound[index].alpha : reference.bound[index].color) + slack;
         wrong += std::fabs(static_cast<double>(pixel[channel]) - reference.rgba[index][channel]) > bound;
       }
     }

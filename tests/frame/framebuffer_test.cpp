@@ -36,7 +36,7 @@ TEST(AddressMap, RegionsFollowOneAnotherInPagesOf64KiB) {
   Frame frame(100, 40);
   frame.draw(empty_geometry(3000), {});
   frame.draw(empty_geometry(2000, true), {});
-  for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
+  for (const ColorFormat format : color_formats) {
     const AddressMap map = address_map(frame, format);
     std::uint64_t free_from = 0;
     for (const MemoryRegion& region : {map.color, map.depth_stencil, map.vertices, map.primitives, map.attributes}) {

@@ -98,7 +98,7 @@ TEST_P(MultiPass, IsTheSplatsUpToTheEndOfTheBatchInWhichAPixelPassesTheThreshold
         bool near = false;
         for (; pass + 1 < passes; ++pass) {
           const double alpha = after[pass].rgba[index][3];
-          near = near || std::fabs(alpha - threshold) <= after[pass].bound[index][1] + 2e-5;
+          near = near || std::fabs(alpha - threshold) <= after[pass].bound[index].alpha + 2e-5;
           if (alpha >= threshold) break;
         }
         if (near) {
@@ -108,8 +108,8 @@ TEST_P(MultiPass, IsTheSplatsUpToTheEndOfTheBatchInWhichAPixelPassesTheThreshold
         ++ends[pass];
         const auto pixel = result.framebuffer.color.pixel(x, y);
         for (unsigned channel = 0; channel < 4; ++channel) {
-          const double bound =
-              after[pass].bound[index][channel == 3 ? 1 : 0] + 2e-5 + 1.0 / 255;  // at an edge of pruning
+          const double bound = (channel == 3 ? after[pass].bound[index].alpha : after[pass].bound[index].color) + 2e-5 +
+                               1.0 / 255;  // at an edge of pruning
           wrong += std::fabs(static_cast<double>(pixel[channel]) - after[pass].rgba[index][channel]) > bound ? 1U : 0U;
         }
       }

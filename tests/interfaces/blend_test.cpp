@@ -18,7 +18,6 @@ namespace {
 
 using testing::color_of;
 
-constexpr ColorFormat color_formats[] = {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f};
 constexpr BlendRounding roundings[] = {BlendRounding::rne, BlendRounding::rtz};
 
 /// What a cleared pixel holds after `count` fragments of one alpha and one grey.
@@ -43,8 +42,8 @@ bool terminates(ColorFormat format, BlendRounding rounding, float alpha) {
 TEST(Unorm8, AllStoredValuesStay) {
   for (int level = 0; level < 256; ++level) {
     const float value = static_cast<float>(level) / 255.0F;
-    ASSERT_EQ(round_to_unorm8(splat_lanes(value))[0], value);
-    ASSERT_EQ(truncate_to_unorm8(splat_lanes(value))[0], value);
+    ASSERT_EQ(round_to_unorm<255>(splat_lanes(value))[0], value);
+    ASSERT_EQ(truncate_to_unorm<255>(splat_lanes(value))[0], value);
   }
 }
 
@@ -52,17 +51,54 @@ TEST(Unorm8, AllStoredValuesStay) {
 TEST(Unorm8, RoundsToTheNearestLevelAndClamps) {
   for (int level = 0; level < 255; ++level) {
     const double middle = (level + 0.5) / 255.0;
-    ASSERT_EQ(round_to_unorm8(splat_lanes(static_cast<float>(middle - 1e-6)))[0], static_cast<float>(level) / 255.0F);
-    ASSERT_EQ(round_to_unorm8(splat_lanes(static_cast<float>(middle + 1e-6)))[0],
+    ASSERT_EQ(round_to_unorm<255>(splat_lanes(static_cast<float>(middle - 1e-6)))[0],
+              static_cast<float>(level) / 255.0F);
+    ASSERT_EQ(round_to_unorm<255>(splat_lanes(static_cast<float>(middle + 1e-6)))[0],
               static_cast<float>(level + 1) / 255.0F);
-    ASSERT_EQ(truncate_to_unorm8(splat_lanes(static_cast<float>((level + 0.99) / 255.0)))[0],
+    ASSERT_EQ(truncate_to_unorm<255>(splat_lanes(static_cast<float>((level + 0.99) / 255.0)))[0],
               static_cast<float>(level) / 255.0F);
   }
-  EXPECT_EQ(round_to_unorm8(splat_lanes(-3.0F))[0], 0.0F);
-  EXPECT_EQ(round_to_unorm8(splat_lanes(7.0F))[0], 1.0F);
-  EXPECT_EQ(round_to_unorm8(splat_lanes(HUGE_VALF))[0], 1.0F);
-  EXPECT_EQ(round_to_unorm8(splat_lanes(std::nanf("")))[0], 0.0F);
-  EXPECT_EQ(truncate_to_unorm8(splat_lanes(std::nanf("")))[0], 0.0F);
+  EXPECT_EQ(round_to_unorm<255>(splat_lanes(-3.0F))[0], 0.0F);
+  EXPECT_EQ(round_to_unorm<255>(splat_lanes(7.0F))[0], 1.0F);
+  EXPECT_EQ(round_to_unorm<255>(splat_lanes(HUGE_VALF))[0], 1.0F);
+  EXPECT_EQ(round_to_unorm<255>(splat_lanes(std::nanf("")))[0], 0.0F);
+  EXPECT_EQ(truncate_to_unorm<255>(splat_lanes(std::nanf("")))[0], 0.0F);
+}
+
+TEST(Unorm16, AllStoredValuesStay) {
+  for (int level = 0; level < 65536; ++level) {
+    const float value = static_cast<float>(level) / 65535.0F;
+    ASSERT_EQ(round_to_unorm<65535>(splat_lanes(value))[0], value);
+    ASSERT_EQ(truncate_to_unorm<65535>(splat_lanes(value))[0], value);
+  }
+}
+
+TEST(Unorm16, RoundsToTheNearestLevelAndClamps) {
+  for (int level = 0; level < 65535; ++level) {
+    // D3D11.3 allows 0.6 levels; single precision can say n + 1/2 within 2^-8.
+    const auto at = [&](double part) { return splat_lanes(static_cast<float>((level + part) / 65535.0)); };
+    ASSERT_EQ(round_to_unorm<65535>(at(0.49))[0], static_cast<float>(level) / 65535.0F);
+    ASSERT_EQ(round_to_unorm<65535>(at(0.51))[0], static_cast<float>(level + 1) / 65535.0F);
+    ASSERT_EQ(truncate_to_unorm<65535>(at(0.98))[0], static_cast<float>(level) / 65535.0F);
+  }
+  EXPECT_EQ(round_to_unorm<65535>(splat_lanes(-3.0F))[0], 0.0F);
+  EXPECT_EQ(round_to_unorm<65535>(splat_lanes(HUGE_VALF))[0], 1.0F);
+  EXPECT_EQ(round_to_unorm<65535>(splat_lanes(std::nanf("")))[0], 0.0F);
+}
+
+TEST(Unorm16, BlendsOfStoredValuesAreTheExactOnesWhereNoTieIsNear) {
+  const BlendFunction blend = blend_function(ColorFormat::rgba16, BlendRounding::rne);
+  for (std::uint64_t i = 0; i < 300'000; ++i) {
+    const auto alpha = static_cast<std::int64_t>(mix(3 * i) % 65536);
+    const auto source = static_cast<std::int64_t>(mix(3 * i + 1) % 65536);
+    const auto as_float = [](std::int64_t level) { return static_cast<float>(level) / 65535.0F; };
+    const QuadColor result = blend(color_of(0, 0, 0, as_float(alpha)), color_of(0, 0, 0, as_float(source)));
+    // In levels, times 65535: exact in 64 bits.
+    const std::int64_t exact = alpha * 65535 + (65535 - alpha) * source;
+    const std::int64_t rest = exact % 65535;
+    if (std::abs(2 * rest - 65535) < 2 * 65535 / 100) continue;
+    ASSERT_EQ(result.alpha[0], as_float((exact + 32767) / 65535)) << alpha << ' ' << source;
+  }
 }
 
 TEST(Unorm8, AllBlendsOfStoredValuesAreTheIntegerFormula) {
@@ -121,6 +157,21 @@ TEST(BlendBits, TheSmallestAlphaThatTerminatesIsThatOfTheFormatsRounding) {
   EXPECT_FALSE(terminates(ColorFormat::rgba16f, BlendRounding::rtz, 1.0F / 9.0F - 0x1p-12F));
   EXPECT_TRUE(terminates(ColorFormat::rgba8, BlendRounding::rne, 0.25F));
   EXPECT_FALSE(terminates(ColorFormat::rgba8, BlendRounding::rne, 0.25F - 0x1p-12F));
+  EXPECT_TRUE(terminates(ColorFormat::srgb8, BlendRounding::rne, 0.25F)) << "its alpha is linear";
+  EXPECT_FALSE(terminates(ColorFormat::srgb8, BlendRounding::rne, 0.25F - 0x1p-12F));
+}
+
+// case B02
+TEST(BlendBits, OfUnorm16EveryAlphaThatSurvivesPruningTerminates) {
+  // The last level below 0.996 is 65272, and it is left if (1 - 65272/65535) alpha is half a level.
+  constexpr float least = 0.5F / 263.0F;
+  EXPECT_NEAR(least, 0.0019, 1e-5);
+  EXPECT_TRUE(terminates(ColorFormat::rgba16, BlendRounding::rne, 1.02F * least));
+  EXPECT_FALSE(terminates(ColorFormat::rgba16, BlendRounding::rne, 0.98F * least));
+  EXPECT_TRUE(terminates(ColorFormat::rgba16, BlendRounding::rne, 1.0F / 255.0F));
+  EXPECT_TRUE(terminates(ColorFormat::rgba16, BlendRounding::rtz, 2.04F * least));
+  EXPECT_FALSE(terminates(ColorFormat::rgba16, BlendRounding::rtz, 1.96F * least));
+  EXPECT_TRUE(terminates(ColorFormat::rgba16, BlendRounding::rtz, 1.0F / 255.0F)) << "just: 1 of 255 is 1.03 levels";
 }
 
 // case B02
@@ -171,6 +222,43 @@ TEST(BlendBits, AStuckAlphaLeaksColourByTheKnownAmounts) {
   EXPECT_EQ(half_bits(stack.alpha()), 0x3BF6);
 }
 
+// case B04
+TEST(BlendBits, OfUnorm16AlphaGoesOnAndColourLeaksNothingOverThousandsOfLayers) {
+  for (const unsigned count : {200U, 800U, 3200U, 20'000U}) {
+    Stack stack(ColorFormat::rgba16, BlendRounding::rne);
+    stack.add(0.99F, 0, 1);
+    stack.add(0.02F, 1, count);
+    const double exact = 0.01 * (1 - std::pow(0.98, count));
+    // Both stop where half a level is left: 25 levels of alpha below 1.
+    EXPECT_NEAR(static_cast<double>(stack.grey()), exact, 26.0 / 65535.0);
+    EXPECT_NEAR(static_cast<double>(stack.alpha()), 0.99 + exact, 26.0 / 65535.0);
+    EXPECT_EQ(stack.alpha() >= 0.996F, count >= 200);
+  }
+}
+
+TEST(BlendBits, OfSrgbDarkColoursLeakWhereLinearOnesAreLost) {
+  // Behind an alpha of 0.99, white at 0.02 adds 0.0002: less than half a level of UNORM8, and more than half of sRGB's first, 0.0003.
+  for (const auto& [format, grows] : {std::pair{ColorFormat::rgba8, false}, {ColorFormat::srgb8, true}}) {
+    Stack stack(format, BlendRounding::rne);
+    stack.add(0.99F, 0, 1);
+    stack.add(0.02F, 1, 800);
+    EXPECT_EQ(stack.grey() > 0, grows) << name_of(format);
+    EXPECT_LT(stack.grey(), 0.01F) << "a level is soon wider than twice that";
+  }
+}
+
+TEST(Blend, UnormTargetsSaturateAndKeepTheirAlpha) {
+  for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16, ColorFormat::srgb8}) {
+    for (const BlendRounding rounding : roundings) {
+      Stack stack(format, rounding);
+      stack.add(0.5F, 4.0F, 20);
+      EXPECT_EQ(stack.grey(), 1.0F) << name_of(format);
+      EXPECT_LE(stack.alpha(), 1.0F) << name_of(format);
+      EXPECT_GE(stack.alpha(), 0.98F) << name_of(format);
+    }
+  }
+}
+
 // case B05
 TEST(Blend, AlphaNeverFallsAndNeverPassesOne) {
   for (const BlendRounding rounding : roundings) {
@@ -215,9 +303,14 @@ TEST(Blend, AnOpaquePixelTakesNothingMore) {
 
 // case B08
 TEST(Blend, IsWithinTheConformanceToleranceOfExactBlending) {
-  const double tolerances[] = {4.0 / 255.0, 0.005, 1e-5};
-  for (unsigned f = 0; f < 3; ++f) {
-    const BlendFunction blend = blend_function(color_formats[f], BlendRounding::rne);
+  // Of sRGB as of UNORM8: where a level is widest, at white, it is 2.3 of these.
+  const std::pair<ColorFormat, double> tolerances[] = {{ColorFormat::rgba8, 4.0 / 255.0},
+                                                       {ColorFormat::srgb8, 4.0 / 255.0},
+                                                       {ColorFormat::rgba16f, 0.005},
+                                                       {ColorFormat::rgba16, 4.0 / 65535.0},
+                                                       {ColorFormat::rgba32f, 1e-5}};
+  for (const auto& [format, tolerance] : tolerances) {
+    const BlendFunction blend = blend_function(format, BlendRounding::rne);
     for (std::uint64_t i = 0; i < 20'000; ++i) {
       const QuadColor destination =
           blend(QuadColor{}, color_of(testing::uniform(1, 8 * i, 0, 1), 0, 0, testing::uniform(1, 8 * i + 1, 0, 1)));
@@ -226,8 +319,8 @@ TEST(Blend, IsWithinTheConformanceToleranceOfExactBlending) {
       const QuadColor result = blend(destination, color_of(red, 0, 0, alpha));
       const double exact = static_cast<double>(destination.red[0]) +
                            (1.0 - static_cast<double>(destination.alpha[0])) * static_cast<double>(red);
-      ASSERT_NEAR(static_cast<double>(result.red[0]),
-                  color_formats[f] == ColorFormat::rgba8 ? std::fmin(exact, 1.0) : exact, tolerances[f]);
+      ASSERT_NEAR(static_cast<double>(result.red[0]), std::fmin(exact, static_cast<double>(largest_color_of(format))),
+                  tolerance);
     }
   }
 }
@@ -352,10 +445,28 @@ TEST(FrontToBack, IsWithinItsArithmeticErrorOfDouble) {
   }
 }
 
+TEST(BlendFunctions, RoundingAsMeasuredIsRefusedForFormatsThatNobodyHasMeasured) {
+  for (const ColorFormat format : color_formats) {
+    if (is_measured(format)) {
+      EXPECT_NE(blend_function(format, BlendRounding::measured), nullptr);
+      continue;
+    }
+    try {
+      blend_function(format, BlendRounding::measured);
+      ADD_FAILURE() << name_of(format);
+    } catch (const UserError& error) {
+      EXPECT_NE(std::string(error.what()).find(name_of(format)), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("measured"), std::string::npos) << error.what();
+    }
+  }
+}
+
 TEST(ColorFormatNames, ThoseThatCannotBlendFrontToBackSayWhy) {
   EXPECT_EQ(color_format_named("rgba8"), ColorFormat::rgba8);
   EXPECT_EQ(color_format_named("rgba16f"), ColorFormat::rgba16f);
   EXPECT_EQ(color_format_named("rgba32f"), ColorFormat::rgba32f);
+  EXPECT_EQ(color_format_named("rgba16"), ColorFormat::rgba16);
+  EXPECT_EQ(color_format_named("srgb8"), ColorFormat::srgb8);
   for (const char* name : {"rgb10a2", "r11g11b10f", "rgba64f"}) {
     try {
       color_format_named(name);

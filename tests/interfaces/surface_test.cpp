@@ -11,7 +11,7 @@ namespace vrpipe {
 namespace {
 
 TEST(ColorSurface, EveryQuadHasAnAddressOfItsOwnAlignedToItsSize) {
-  for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
+  for (const ColorFormat format : color_formats) {
     const ColorSurface surface(33, 17, format);
     const unsigned bytes = 4 * bytes_per_pixel(format);
     std::set<std::uint64_t> addresses;

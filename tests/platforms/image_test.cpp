@@ -12,7 +12,6 @@ using testing::run;
 using testing::same_image;
 using testing::strictly;
 
-constexpr ColorFormat color_formats[] = {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f};
 
 struct Size {
   std::uint32_t width, height, splats;

@@ -65,7 +65,8 @@ TEST_P(InShaderVariants, FidelitiesAgreeOnTime) {
       return static_cast<double>(run(on(GetParam(), variant, fidelity), longer).cycles.value());
     };
     const double cycle = cycles(Fidelity::cycle);
-    EXPECT_NEAR(cycles(Fidelity::lt), cycle, 0.02 * cycle) << variant;
+    // Without a lock SMs bound it, and the order in which warps come to their schedulers.
+    EXPECT_NEAR(cycles(Fidelity::lt), cycle, 0.035 * cycle) << variant;
     EXPECT_LE(cycles(Fidelity::bound), cycle) << variant;
   }
 }

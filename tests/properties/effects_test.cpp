@@ -18,7 +18,7 @@ using testing::whole;
 rc::Gen<Fidelity> fidelity() { return rc::gen::elementOf(fidelities()); }
 
 /// Sizes, queues and switches on which effects depend.
-std::vector<Setting> settings() {
+std::vector<Setting> settings(ColorFormat format) {
   std::vector<Setting> all = *bins();
   const auto maybe = [&](const char* unit, const char* parameter, const rc::Gen<const char*>& value) {
     if (*whole(0, 3) == 0) all.push_back({unit, parameter, *value});
@@ -30,7 +30,7 @@ std::vector<Setting> settings() {
   maybe("draw", "warps_per_1024_cycles", rc::gen::element("4", "1024"));
   maybe("zrop", "fast_clear", rc::gen::element("on", "off"));
   maybe("state", "subpixel_bits", rc::gen::element("4", "12"));
-  maybe("state", "blend_rounding", rc::gen::element("rtz", "measured"));
+  maybe("state", "blend_rounding", testing::rounding(format));
   maybe("state", "splat_extent", rc::gen::element("aabb", "three_sigma", "fill_rectangle"));
   maybe("crop", "cache_bytes", rc::gen::element("2048", "4096"));
   for (const char* link : {"prop.release", "prop.late", "tc.bins", "qru.warps", "crop.terminations", "raster.quads"}) {
@@ -122,7 +122,7 @@ RunRequest any_request(const Machine& machine) {
     request.stall_seed = static_cast<std::uint64_t>(*whole(1, 1000));
     request.stall_per_256 = 64;
   }
-  request.settings = settings();
+  request.settings = settings(request.format);
   request.settings.insert(request.settings.end(), machine.settings.begin(), machine.settings.end());
   return request;
 }

@@ -27,8 +27,6 @@ class Parameters : public ::testing::Environment {
 [[maybe_unused]] ::testing::Environment* const parameters_environment =
     ::testing::AddGlobalTestEnvironment(new Parameters);
 
-rc::Gen<const char*> rounding() { return rc::gen::element("rne", "rtz", "measured"); }
-
 std::uint64_t statistic(const RunResult& result, const std::string& name) {
   for (const StatisticReport& report : result.statistics) {
     if (report.name == name) return report.value;
@@ -40,7 +38,7 @@ RC_GTEST_PROP(Pipeline, NoNanAndNoInfinityReachesTheTarget, ()) {
   const Draw draw = *scene(60, 70000.0F);
   RunRequest r = drawn_request();
   r.settings = *bins();
-  r.settings.push_back({"state", "blend_rounding", *rounding()});
+  r.settings.push_back({"state", "blend_rounding", *rounding(r.format)});
   r.settings.push_back({"state", "exponential", *rc::gen::element("ex2", "exact", "fp16", "table256", "table16")});
   r.settings.push_back({"state", "splat_extent", *rc::gen::element("obb", "aabb", "three_sigma", "fill_rectangle")});
   r.settings.push_back({"state", "subpixel_bits", *rc::gen::element("8", "4", "12")});

@@ -116,7 +116,13 @@ inline rc::Gen<Draw> scene(int splats, float largest) {
 }
 
 inline rc::Gen<ColorFormat> format() {
-  return rc::gen::element(ColorFormat::rgba16f, ColorFormat::rgba8, ColorFormat::rgba32f);
+  return rc::gen::element(ColorFormat::rgba16f, ColorFormat::rgba8, ColorFormat::rgba32f, ColorFormat::rgba16,
+                          ColorFormat::srgb8);
+}
+
+/// Of the blender: as measured only where somebody has.
+inline rc::Gen<const char*> rounding(ColorFormat of) {
+  return is_measured(of) ? rc::gen::element("rne", "rtz", "measured") : rc::gen::element("rne", "rtz");
 }
 
 /// Bin sizes and counts far from the defaults, and also the defaults.

@@ -142,7 +142,8 @@ inline void expect_image(const RunResult& result, const MixedReference& referenc
       const std::size_t index = std::size_t{y} * mixed_frame_width + x;
       const auto pixel = result.framebuffer.color.pixel(x, y);
       for (unsigned channel = 0; channel < 4; ++channel) {
-        const double bound = reference.bound[index][channel == 3 ? 1 : 0] + slack + 2e-5;
+        const double bound =
+            (channel == 3 ? reference.bound[index].alpha : reference.bound[index].color) + slack + 2e-5;
         const double off = std::fabs(static_cast<double>(pixel[channel]) - reference.rgba[index][channel]);
         if (off > bound && ++wrong < 4) {
           ADD_FAILURE() << "pixel " << x << "," << y << " channel " << channel << ": " << pixel[channel] << " for "

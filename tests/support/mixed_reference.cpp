@@ -68,12 +68,6 @@ std::uint32_t quantized(DepthFormat format, Exact depth) {
   return static_cast<std::uint32_t>(std::floor(std::min(std::max(depth, Exact{0}), Exact{1}) * steps + Exact{0.5}));
 }
 
-double half_ulp_of_half(double value) {
-  int exponent = 0;
-  std::frexp(value, &exponent);
-  return std::ldexp(0.5, (value == 0 ? -14 : std::max(exponent - 1, -14)) - 10);
-}
-
 class Renderer {
  public:
   explicit Renderer(const RenderContext& context) : context_(context), frame_(*context.frame) {
@@ -234,18 +228,15 @@ class Renderer {
   }
   void blend(std::size_t pixel, const std::array<double, 4>& color) {
     std::array<double, 4>& rgba = out_.rgba[pixel];
-    std::array<double, 2>& bound = out_.bound[pixel];
-    const double transmitted = 1 - rgba[3];
-    for (unsigned i = 0; i < 4; ++i) rgba[i] += transmitted * color[i];
-    constexpr double arithmetic = 4.0 / 16777216.0;
-    const double largest = std::max({rgba[0], rgba[1], rgba[2]});
-    bound[0] += std::max({color[0], color[1], color[2]}) * bound[1] + half_ulp_of_half(largest) +
-                arithmetic * std::fmax(1.0, largest);
-    bound[1] = (1 - color[3]) * bound[1] + half_ulp_of_half(rgba[3]) + arithmetic;
+    const double before = rgba[3];
+    for (unsigned i = 0; i < 4; ++i) rgba[i] += (1 - before) * color[i];
+    running_.blended(out_.bound[pixel], color[3], std::max({color[0], color[1], color[2]}), before, rgba[3],
+                     std::max({rgba[0], rgba[1], rgba[2]}));
   }
 
   const RenderContext& context_;
   const Frame& frame_;
+  const RunningBound running_{ColorFormat::rgba16f, BlendRounding::rne, true};
   MixedReference out_;
 };
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <vector>
 
+#include <vrpipe/arithmetic/running_bound.h>
 #include <vrpipe/pipeline/render_context.h>
 
 namespace vrpipe::testing {
@@ -24,12 +25,12 @@ struct MixedCounts {
 };
 
 /// A frame as order alone makes it: sample by sample, without tiles, quads, queues, merging or termination. Coverage and depth
-/// of triangles are exact but for one rounding, all else is in double. The bound is that of render_reference().
+/// of triangles are exact but for one rounding, all else is in double.
 struct MixedReference {
   std::uint32_t width = 0, height = 0;
-  std::vector<std::array<double, 4>> rgba;   ///< row by row, premultiplied
-  std::vector<std::array<double, 2>> bound;  ///< of a colour channel, of alpha
-  std::vector<std::uint32_t> depth;          ///< as stored
+  std::vector<std::array<double, 4>> rgba;  ///< row by row, premultiplied
+  std::vector<PixelBound> bound;            ///< of RGBA16F, rounded to the nearest
+  std::vector<std::uint32_t> depth;         ///< as stored
   std::vector<unsigned> stencil;
   std::vector<MixedCounts> of_draw;
   std::uint64_t near_prune_edge = 0;  ///< fragments whose fate rounding may decide

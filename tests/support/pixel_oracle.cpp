@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <vrpipe/arithmetic/running_bound.h>
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/pipeline/slots/raster.h>
 #include <vrpipe/pipeline/slots/sm.h>
@@ -21,21 +22,6 @@ std::unique_ptr<Behaviour> make(const char* slot, const char* name, const Render
   std::unique_ptr<Behaviour> behaviour = implementation.make_behaviour(*parameters, context);
   out = dynamic_cast<SlotBehaviour*>(behaviour.get());
   return behaviour;
-}
-
-/// The most that one rounding to the format is off at a magnitude: half an ulp, or one where it truncates.
-double rounding_error(const RenderContext& context, double magnitude) {
-  double error = 0;
-  if (context.format == ColorFormat::rgba8) {
-    error = 0.5 / 255.0;
-  } else {
-    const int significand_bits = context.format == ColorFormat::rgba16f ? 11 : 24;
-    const int least_exponent = context.format == ColorFormat::rgba16f ? -13 : -125;
-    int exponent = 0;
-    std::frexp(magnitude, &exponent);
-    error = std::ldexp(0.5, std::max(exponent, least_exponent) - significand_bits);
-  }
-  return context.precision.blend_rounding == BlendRounding::rne ? error : 2 * error;
 }
 
 }  // namespace
@@ -82,23 +68,20 @@ std::vector<std::vector<OracleFragment>> fragments_of(const RenderContext& conte
 }
 
 OraclePixel blend_exactly(const std::vector<OracleFragment>& fragments, const RenderContext& context) {
-  // Of multiply, add and 1 - alpha in single precision, and as many again for merging.
-  constexpr double arithmetic = 8.0 / 16777216.0;
+  const RunningBound running(context.format, context.precision.blend_rounding, true);
   OraclePixel pixel;
-  double alpha_error = 0;
+  std::array<PixelBound, 3> bounds{};  // channel by channel
   for (const OracleFragment& fragment : fragments) {
-    const double transmittance = 1.0 - pixel.rgba[3];
+    const double before = pixel.rgba[3];
     const double alpha = fragment.alpha;
+    pixel.rgba[3] += (1.0 - before) * alpha;
     for (unsigned i = 0; i < 3; ++i) {
       const double color = fragment.color[i];
-      pixel.rgba[i] += transmittance * color;
-      const double reach = std::fabs(pixel.rgba[i]) + pixel.color_bound[i];
-      pixel.color_bound[i] += color * alpha_error + rounding_error(context, reach) + arithmetic * std::max(1.0, reach);
+      pixel.rgba[i] += (1.0 - before) * color;
+      running.blended(bounds[i], alpha, color, before, pixel.rgba[3], pixel.rgba[i]);
+      pixel.color_bound[i] = bounds[i].color;
     }
-    pixel.rgba[3] += transmittance * alpha;
-    alpha_error =
-        (1.0 - alpha) * alpha_error + rounding_error(context, std::min(1.0, pixel.rgba[3] + alpha_error)) + arithmetic;
-    pixel.alpha_bound = std::max(pixel.alpha_bound, alpha_error);
+    pixel.alpha_bound = std::max(pixel.alpha_bound, bounds[0].alpha);
     ++pixel.fragments;
   }
   return pixel;

@@ -8,18 +8,6 @@ namespace vrpipe::testing {
 namespace {
 
 constexpr double kPrune = 1.0 / 255.0;
-constexpr double kArithmeticError = 4.0 / 16777216.0;
-
-/// Half a unit in the last place of `value` in the format.
-double half_ulp(BoundFormat format, double value) {
-  if (format == BoundFormat::rgba8) return 0.5 / 255.0;
-  const int mantissa_bits = format == BoundFormat::rgba16f ? 10 : 23;
-  const int least_exponent = format == BoundFormat::rgba16f ? -14 : -126;
-  int exponent = 0;
-  std::frexp(value, &exponent);  // value = m 2^exponent, m in [0.5, 1)
-  exponent = value == 0 ? least_exponent : std::max(exponent - 1, least_exponent);
-  return std::ldexp(0.5, exponent - mantissa_bits);
-}
 
 /// One axis of an oriented box.
 struct Axis {
@@ -55,6 +43,7 @@ ReferenceImage render_reference(const Draw& draw, const ReferenceOptions& option
   const std::size_t pixels = static_cast<std::size_t>(draw.width) * draw.height;
   image.rgba.resize(pixels);
   image.near_edge_per_pixel.resize(pixels);
+  const RunningBound running(options.bound_format.value_or(ColorFormat::rgba32f), BlendRounding::rne, false);
   if (options.bound_format) image.bound.resize(pixels);
   const double threshold = options.termination_threshold.value_or(2.0);
   const double width = draw.width, height = draw.height;
@@ -98,11 +87,8 @@ ReferenceImage render_reference(const Draw& draw, const ReferenceOptions& option
         for (std::size_t i = 0; i < 3; ++i) rgba[i] += transmitted * alpha * colour[i];
         rgba[3] += transmitted * alpha;
         if (options.bound_format) {
-          auto& bound = image.bound[pixel];
-          const double c = std::max(rgba[0], std::max(rgba[1], rgba[2]));
-          bound[0] += largest_colour * alpha * bound[1] + half_ulp(*options.bound_format, c) +
-                      kArithmeticError * std::max(1.0, c);
-          bound[1] = (1.0 - alpha) * bound[1] + half_ulp(*options.bound_format, rgba[3]) + kArithmeticError;
+          running.blended(image.bound[pixel], alpha, alpha * largest_colour, 1.0 - transmitted, rgba[3],
+                          std::max(rgba[0], std::max(rgba[1], rgba[2])));
         }
       }
     }

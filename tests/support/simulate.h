@@ -86,37 +86,32 @@ inline double utilization(const RunResult& result, const std::string& unit) {
   return 0;
 }
 
-inline BoundFormat bound_format(ColorFormat format) {
-  return format == ColorFormat::rgba8     ? BoundFormat::rgba8
-         : format == ColorFormat::rgba16f ? BoundFormat::rgba16f
-                                          : BoundFormat::rgba32f;
-}
-
 /// Checks every pixel against the double-precision reference: within its running bound, `slack` times the largest
 /// colour (what termination may leave out), and what fragments at the very edge of pruning can change.
 inline void expect_near_reference(const RunResult& result, const Draw& draw, double slack) {
   ReferenceOptions options;
-  options.bound_format = bound_format(result.request.format);
+  options.bound_format = result.request.format;
   const ReferenceImage reference = render_reference(draw, options);
   double largest = 1;
   for (const Splat& splat : draw.splats) {
     largest = std::fmax(largest, static_cast<double>(std::fmax(splat.red, std::fmax(splat.green, splat.blue))));
   }
-  const bool clamps = result.request.format == ColorFormat::rgba8;
+  const auto most = static_cast<double>(largest_color_of(result.request.format));
   std::size_t wrong = 0;
   std::string first;
   for (std::uint32_t y = 0; y < draw.height; ++y) {
     for (std::uint32_t x = 0; x < draw.width; ++x) {
       const std::size_t index = std::size_t{y} * draw.width + x;
       const auto pixel = result.framebuffer.color.pixel(x, y);
+      const PixelBound& rounding = reference.bound[index];
       const auto& exact = reference.rgba[index];
       // The shader's alpha is off by some ulps of u, v and the exponential; 2e-5 of what is blended covers them.
       const double shader = 2e-5 * largest;
       const double edge = reference.near_edge_per_pixel[index] * largest / 255.0;
       for (unsigned channel = 0; channel < 4; ++channel) {
         const double bound =
-            reference.bound[index][channel == 3 ? 1 : 0] + slack * (channel == 3 ? 1 : largest) + shader + edge;
-        const double want = clamps ? std::fmin(exact[channel], 1.0) : exact[channel];
+            (channel == 3 ? rounding.alpha : rounding.color) + slack * (channel == 3 ? 1 : largest) + shader + edge;
+        const double want = std::fmin(exact[channel], most);
         const double off = std::fabs(static_cast<double>(pixel[channel]) - want);
         if (off <= bound) continue;
         if (wrong++ == 0) {

@@ -98,7 +98,12 @@ tools::AccuracyResult large_result() {
   run.run.cycles = 1234567890;
   run.cycles_change_percent = -12.345;
   run.error = {101.23, 0.99999, 0.0123, 1234567, 0.9999};
+  run.proved_max_error = 0.01234;
   run.pixels_stuck = 1234567;
+  run.l2_bytes = 12'345'678'901;
+  run.dram_bytes = 12'345'678'901;
+  run.millijoules = tools::Range{1, 1234.5, 2000};
+  run.by_fragments = {{1024, 2047, 1234567, 0.0001234, 0.0123, 0.1234}};
   run.on_front = true;
   result.runs.push_back(run);
   for (const tools::PrecisionKnob& knob : tools::precision_knobs()) {
@@ -129,7 +134,7 @@ TEST(AccuracyText, TablesFitATerminalOf80Columns) {
       EXPECT_LE(all[row].size(), 80U) << all[row];
     }
   }
-  EXPECT_EQ(tables, 4U);
+  EXPECT_EQ(tables, 6U);
 }
 
 TEST(AccuracyText, SaysWhatBoundsTheDrawWherePricesCollapse) {
@@ -170,10 +175,11 @@ TEST(AccuracyText, SaysWhatAccuracyCosts) {
 TEST(PrecisionKnobs, AreAllThatTheHardwareChooses) {
   std::vector<std::string> names;
   for (const auto& knob : tools::precision_knobs()) names.push_back(knob.name);
-  EXPECT_EQ(names, (std::vector<std::string>{"format", "blend_rounding", "termination_threshold", "termination_compare",
-                                             "termination", "pruning_threshold", "subpixel_bits", "exponential",
-                                             "depth_key_bits", "sh_degree", "splat_extent", "quad_merging",
-                                             "early_termination"}));
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"format", "blend_rounding", "termination_threshold", "termination_compare",
+                                      "termination", "pruning_threshold", "subpixel_bits", "exponential", "shading",
+                                      "merging", "attributes", "export_format", "alpha_max", "depth_key_bits",
+                                      "sh_degree", "dilation", "splat_extent", "quad_merging", "early_termination"}));
   // A choice that is added to a parameter belongs here too.
   for (const ParameterListing& unit : tools::all_parameters(nullptr)) {
     for (const Parameter* parameter : unit.parameters->parameters()) {
@@ -421,7 +427,7 @@ TEST_F(Accuracy, PrecisionHasEveryValueOfEveryKnob) {
     EXPECT_EQ(defaults, 1U) << knob.name;
   }
   EXPECT_EQ(i, ladder.size());
-  EXPECT_EQ(result["knobs_left_out"], (json{"depth_key_bits", "sh_degree"}));
+  EXPECT_EQ(result["knobs_left_out"], (json{"depth_key_bits", "sh_degree", "dilation"}));
   // The default's numbers are those of `run`.
   const json alone = json_of({"run", "--scene", "tiny.spl"})["runs"][0];
   EXPECT_EQ(by_default["result_hash"], alone["result_hash"]);
@@ -443,6 +449,74 @@ TEST_F(Accuracy, FewerBitsAreFartherFromTheExactImage) {
   EXPECT_GT(rows.at("format=rgba8")["max_abs_error"].get<double>(), 1 / 255.0);
   EXPECT_GT(rows.at("format=rgba8")["share_differing_8bit"].get<double>(),
             rows.at("early_termination=off")["share_differing_8bit"].get<double>());
+}
+
+TEST_F(Accuracy, NoErrorIsBeyondWhatIsProved) {
+  std::set<std::string> without;
+  const json result = accuracy({});
+  for (const json& row : result["precision"]) {
+    const std::string name = row["knob"].get<std::string>() + "=" + row["value"].get<std::string>();
+    if (row["proved_max_abs_error"].is_null()) {
+      without.insert(name);
+      continue;
+    }
+    EXPECT_LE(row["max_abs_error"], row["proved_max_abs_error"]) << name;
+    std::uint64_t pixels = 0;
+    double largest = 0;
+    for (const json& range : row["by_fragments"]) {
+      EXPECT_LE(range["max_abs_error"], range["proved_max_abs_error"]) << name << " from " << range["from"];
+      EXPECT_LE(range["mean_abs_error"], range["max_abs_error"]);
+      pixels += range["pixels"].get<std::uint64_t>();
+      largest = std::max(largest, range["max_abs_error"].get<double>());
+    }
+    EXPECT_EQ(pixels, 48U * 40);
+    EXPECT_EQ(largest, row["max_abs_error"].get<double>());
+  }
+  EXPECT_EQ(without, (std::set<std::string>{"splat_extent=three_sigma"})) << "it cuts off what is visible";
+}
+
+TEST_F(Accuracy, OfEachChoiceItSaysWhatIsMovedAndSpent) {
+  std::map<std::string, json> rows;
+  const json result = accuracy({});
+  for (const json& row : result["precision"])
+    rows[row["knob"].get<std::string>() + "=" + row["value"].get<std::string>()] = row;
+  const auto bytes = [&](const std::string& name) { return rows.at(name)["l2_bytes"].get<double>(); };
+  EXPECT_LT(bytes("format=rgba8"), bytes("format=rgba16f"));
+  EXPECT_EQ(bytes("format=srgb8"), bytes("format=rgba8"));
+  EXPECT_LT(bytes("format=rgba16f"), bytes("format=rgba32f"));
+  const json run = json_of({"run", "--scene", "tiny.spl", "--energy"})["runs"][0];
+  EXPECT_EQ(rows.at("format=rgba16f")["millijoules"], run["energy"]["total_millijoules"]);
+}
+
+TEST_F(Accuracy, ValuesThatNobodyHasMeasuredAreLeftOut) {
+  const json result = accuracy({"--quick", "--set", "state.blend_rounding=measured"});
+  EXPECT_EQ(result["values_never_measured"], json::array()) << "rgba8 has been measured";
+  const Finished refused =
+      vrpipe({"run", "--scene", "tiny.spl", "--format", "rgba16", "--set", "state.blend_rounding=measured"});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.err.find("rgba16"), std::string::npos) << refused.err;
+  const json of_rgba16 = accuracy({"--format", "rgba16"});
+  EXPECT_EQ(of_rgba16["values_never_measured"], json{"blend_rounding=measured"});
+}
+
+TEST(ErrorByFragments, RangesDouble) {
+  tools::ShownImage image{5, 1, {}}, reference{5, 1, {}};
+  for (int i = 0; i < 15; ++i) {
+    image.rgb.push_back(0.5 + 0.01 * i);
+    reference.rgb.push_back(0.5);
+  }
+  const std::vector<tools::ErrorOfRange> ranges =
+      tools::error_by_fragments(image, reference, {0, 1, 2, 3, 900}, {0.1, 0.2, 0.3, 0.25, 0.9});
+  ASSERT_EQ(ranges.size(), 4U);
+  EXPECT_EQ(ranges[2].from, 2U);
+  EXPECT_EQ(ranges[2].to, 3U);
+  EXPECT_EQ(ranges[2].pixels, 2U);
+  EXPECT_NEAR(ranges[2].mean_abs_error, 0.085, 1e-12);
+  EXPECT_NEAR(ranges[2].max_abs_error, 0.11, 1e-12);
+  EXPECT_EQ(ranges[2].proved_max_error, 0.3);
+  EXPECT_EQ(ranges[3].from, 512U);
+  EXPECT_EQ(ranges[3].to, 1023U);
+  EXPECT_FALSE(tools::error_by_fragments(image, reference, {0, 1, 2, 3, 900}, {})[0].proved_max_error);
 }
 
 /// Gaussians at many depths close together, whose colours depend on the direction.
@@ -588,9 +662,9 @@ TEST_F(Accuracy, PageStandsAlone) {
   const std::string page = read_file(folder() / "page.html");
   EXPECT_EQ(page.rfind("<!DOCTYPE html>", 0), 0U);
   EXPECT_EQ(occurrences(page, "</html>"), 1U);
-  EXPECT_EQ(occurrences(page, "<svg"), 2U);
-  EXPECT_EQ(occurrences(page, ">plot as SVG<"), 2U);
-  EXPECT_EQ(occurrences(page, ">data as CSV<"), 2U);
+  EXPECT_EQ(occurrences(page, "<svg"), 3U);
+  EXPECT_EQ(occurrences(page, ">plot as SVG<"), 3U);
+  EXPECT_EQ(occurrences(page, ">data as CSV<"), 3U);
   // Nothing is loaded: the only address is the name of SVG.
   EXPECT_EQ(occurrences(page, "http"), occurrences(page, "xmlns=\"http://www.w3.org/2000/svg\""));
   EXPECT_EQ(occurrences(page, "src="), occurrences(page, "src=\"data:image/png;base64,"));
@@ -623,14 +697,15 @@ TEST_F(Accuracy, KnobsOfThePlotCanBeToldApart) {
     int red, green, blue;
   };
   std::map<std::string, Look> looks;
-  const std::regex pattern(R"re(<(circle|polygon) [^>]*fill="(#\w+)" stroke="(#\w+)"[^>]*><title>(\w+)=)re");
+  const std::regex pattern(R"re(<(circle|polygon) ([^>]*)fill="(#\w+)" stroke="(#\w+)"[^>]*><title>(\w+)=)re");
   for (std::sregex_iterator i(page.begin(), page.end(), pattern), end; i != end; ++i) {
-    const std::string color = (*i)[2] == "#fff" ? (*i)[3] : (*i)[2];
+    const std::string color = (*i)[3] == "#fff" ? (*i)[4] : (*i)[3];
     const unsigned long rgb = std::stoul(color.substr(1), nullptr, 16);
-    looks[(*i)[4]] = {(*i)[1], static_cast<int>(rgb >> 16), static_cast<int>(rgb >> 8 & 255),
-                      static_cast<int>(rgb & 255)};
+    const std::string corners = (*i)[2];  // a comma each
+    looks[(*i)[5]] = {(*i)[1].str() + std::to_string(std::count(corners.begin(), corners.end(), ',')),
+                      static_cast<int>(rgb >> 16), static_cast<int>(rgb >> 8 & 255), static_cast<int>(rgb & 255)};
   }
-  EXPECT_EQ(looks.size(), tools::precision_knobs().size() - 2) << "a draw list leaves out two";
+  EXPECT_EQ(looks.size(), tools::precision_knobs().size() - 3) << "a draw list leaves out three";
   for (const auto& [name, a] : looks) {
     for (const auto& [other, b] : looks) {
       if (name == other || a.shape != b.shape) continue;

@@ -50,7 +50,7 @@ const std::map<std::string, Words> texts_of = {
     {"--plugin", {VRPIPE_PLUGIN_FILE}},
     {"--fidelity", {"functional", "bound", "lt", "cycle"}},
     {"--effects", {"all", "auto", "approximate", "auto,raster.hi_z", "approximate,crop.blend_hazard"}},
-    {"--format", {"rgba8", "rgba16f", "rgba32f"}},
+    {"--format", {"rgba8", "rgba16f", "rgba32f", "rgba16", "srgb8"}},
     {"--termination", {"paper", "strict"}},
     {"--background", {"0,0.5,1", "1,1,1"}},
     {"--relative-to", {"baseline", "het", "mobile/baseline", "own"}},

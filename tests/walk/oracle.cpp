@@ -277,7 +277,8 @@ class Judge {
     if (case_.is_single_draw() || case_.mixed_seed != 0 || case_.variant.quad_merging || !order_decides) return;
     if (case_.format != ColorFormat::rgba32f) return;
     for (const Setting& setting : case_.settings) {
-      for (const char* other : {"exponential", "blend_rounding", "subpixel_bits", "previous_alpha_check"}) {
+      for (const char* other : {"exponential", "blend_rounding", "subpixel_bits", "previous_alpha_check", "shading",
+                                "attributes", "export_format", "alpha_max"}) {
         if (setting.parameter == other) return;
       }
     }

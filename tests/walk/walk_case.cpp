@@ -486,13 +486,17 @@ Case draw_case(std::uint64_t seed, std::uint64_t index, const Draw& real) {
   Case c;
   c.seed = seed;
   c.index = index;
-  const ColorFormat formats[] = {ColorFormat::rgba16f, ColorFormat::rgba8, ColorFormat::rgba32f};
   const Fidelity timed[] = {Fidelity::lt, Fidelity::cycle};
   c.platform = dice.chance(40) ? &simplest_platform() : &dice.one_of(platforms());
   c.variant = dice.one_of(variants());
-  c.format = dice.one_of(formats);
+  c.format = dice.one_of(color_formats);
   c.termination = dice.chance(40) ? Termination::strict : Termination::paper;
   c.settings = draw_settings(dice, *c.platform, c.refused);
+  const auto rounds_as_measured = [](const Setting& setting) {
+    return setting.parameter == "blend_rounding" && setting.value == "measured";
+  };
+  if (!is_measured(c.format) && std::any_of(c.settings.begin(), c.settings.end(), rounds_as_measured))
+    c.format = ColorFormat::rgba16f;
   const std::string left_out = dice.chance(50) ? "qru" : "tgc";
   const auto is_set = [&](const Setting& setting) { return setting.unit == left_out; };
   if (dice.chance(4) && std::none_of(c.settings.begin(), c.settings.end(), is_set)) {

@@ -83,9 +83,9 @@ TEST(ReferenceRenderer, TheRunningBoundHoldsForARoundingBlender) {
     splats.push_back(grey_splat(0.5f, 0.5f, 2, 0.01f + 0.0007f * static_cast<float>(i), i % 3 ? 0.9f : 0.1f));
   const Draw draw = draw_of(1, 1, splats);
   ReferenceOptions options;
-  options.bound_format = BoundFormat::rgba8;
+  options.bound_format = ColorFormat::rgba8;
   const ReferenceImage eight = render_reference(draw, options);
-  options.bound_format = BoundFormat::rgba16f;
+  options.bound_format = ColorFormat::rgba16f;
   const ReferenceImage half = render_reference(draw, options);
   const auto to_unorm8 = [](double v) { return std::floor(v * 255 + 0.5) / 255; };
   const auto to_half = [](double v) {  // round to nearest even at 11 bits
@@ -101,13 +101,13 @@ TEST(ReferenceRenderer, TheRunningBoundHoldsForARoundingBlender) {
       c = round(c + (1 - a) * alpha * s.red);
       a = round(a + (1 - a) * alpha);
     }
-    EXPECT_LE(std::fabs(a - image.at(0, 0)[3]), image.bound[0][1]);
-    EXPECT_LE(std::fabs(c - image.at(0, 0)[0]), image.bound[0][0]);
-    EXPECT_LT(image.bound[0][1], 0.5);
+    EXPECT_LE(std::fabs(a - image.at(0, 0)[3]), image.bound[0].alpha);
+    EXPECT_LE(std::fabs(c - image.at(0, 0)[0]), image.bound[0].color);
+    EXPECT_LT(image.bound[0].alpha, 0.5);
   };
   check(eight, to_unorm8);
   check(half, to_half);
-  EXPECT_LT(half.bound[0][1], eight.bound[0][1]);
+  EXPECT_LT(half.bound[0].alpha, eight.bound[0].alpha);
 }
 
 TEST(ReferenceRenderer, TrianglesAreRefused) {

@@ -161,8 +161,8 @@ void SimulationArguments::declare_rules(Arguments& arguments) {
                   rules_group)
       .default_text = "auto";
   arguments
-      .add_option("--format", format_, "NAME", "colour target: rgba8, rgba16f or rgba32f (default: rgba16f)",
-                  rules_group)
+      .add_option("--format", format_, "NAME",
+                  "colour target: rgba8, srgb8, rgba16f, rgba16 (UNORM) or rgba32f\n(default: rgba16f)", rules_group)
       .default_text = "rgba16f";
   arguments
       .add_option("--termination", termination_, "NAME",

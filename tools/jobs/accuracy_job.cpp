@@ -122,10 +122,28 @@ void write_image(const AccuracyJob& job, AccuracyResult& result, const std::stri
   result.files.write(files.exr, encode_exr(image), "--output");
 }
 
-/// The image that errors are measured against: all bands, exact order.
-ShownImage make_reference(const AccuracyJob& job, const Workload& workload, AccuracyResult& result) {
+/// What errors are measured against: the image with all bands in exact order, and what is proved of each run.
+struct Reference {
+  ShownImage image;
+  std::vector<std::uint32_t> fragments;     ///< of each pixel
+  std::vector<std::vector<double>> proved;  ///< of each run, of each pixel as it is shown; empty where nothing is
+};
+
+Reference make_reference(const AccuracyJob& job, const Workload& workload,
+                         const std::vector<PrecisionSettings>& settings, AccuracyResult& result) {
   const Stopwatch watch;
-  const ExactImage exact = render_exactly(*workload.draw_with(workload.options.exact()));
+  std::vector<DrawnPrecision> precisions;
+  std::vector<std::size_t> runs;
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    // Nothing is proved of other splats than the exact image's.
+    if (!workload.scene.draw_list && !(settings[i].preprocess == workload.options.exact())) continue;
+    const std::optional<DrawnPrecision> precision = drawn_precision(settings[i].request);
+    if (!precision) continue;
+    precisions.push_back(*precision);
+    runs.push_back(i);
+  }
+  const BoundedImage bounded = render_with_bounds(*workload.draw_with(workload.options.exact()), precisions);
+  const ExactImage& exact = bounded.exact;
   result.reference_seconds = watch.seconds();
   if (job.simulation.output) {
     SharedImage image(exact.width, exact.height);
@@ -135,9 +153,32 @@ ShownImage make_reference(const AccuracyJob& job, const Workload& workload, Accu
     }
     write_image(job, result, reference_name, image);
   }
-  ShownImage reference = shown(exact, job.simulation.background);
-  if (job.html) result.reference = picture_of(reference, reference_width);
+  Reference reference{shown(exact, job.simulation.background), bounded.fragments, {}};
+  if (job.html) result.reference = picture_of(reference.image, reference_width);
+  const auto& background = job.simulation.background;
+  const double brightest = *std::max_element(background.begin(), background.end());
+  reference.proved.resize(settings.size());
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    // What alpha lets through is background.
+    for (const PixelBound& bound : bounded.bounds[i])
+      reference.proved[runs[i]].push_back(std::min(1.0, bound.color + brightest * bound.alpha));
+  }
   return reference;
+}
+
+/// Read from a memory and written to it; none where it counts nothing.
+std::optional<std::uint64_t> bytes_moved(const RunResult& run, const std::string& memory) {
+  std::optional<std::uint64_t> bytes;
+  for (const StatisticReport& report : run.statistics) {
+    if (report.name.rfind(memory + ".", 0) != 0) continue;
+    for (const std::string ending : {"_bytes_read", "_bytes_written"}) {
+      if (report.name.size() > ending.size() &&
+          report.name.compare(report.name.size() - ending.size(), ending.size(), ending) == 0) {
+        bytes = bytes.value_or(0) + report.value;
+      }
+    }
+  }
+  return bytes;
 }
 
 /// A precision run's name as part of a file's.
@@ -317,19 +358,52 @@ std::vector<PrecisionSettings> choose_values(const AccuracyJob& job, bool is_dra
         result.precision.push_back({&knob, value, 0});
         continue;
       }
+      PrecisionSettings tried = settings.front();
+      knob.set(tried, value);
+      if (!can_round(tried)) {
+        result.values_never_measured.push_back(knob.name + "=" + value);
+        continue;
+      }
       result.precision.push_back({&knob, value, settings.size()});
-      settings.push_back(settings.front());
-      knob.set(settings.back(), value);
+      settings.push_back(std::move(tried));
       result.runs.emplace_back();
       result.runs.back().name = knob.name + "=" + value;
     }
+  }
+  if (job.quick || !result.base.variant.is_of_pipeline()) return settings;
+  for (const auto& values : precision_crossings()) {
+    PrecisionSettings crossed = settings.front();
+    std::vector<std::pair<std::string, std::string>> changed;
+    for (const auto& [name, value] : values) {
+      const auto knob = std::find_if(precision_knobs().begin(), precision_knobs().end(),
+                                     [&, name = name](const PrecisionKnob& each) { return each.name == name; });
+      if (knob->value(settings.front()) == value) continue;
+      knob->set(crossed, value);
+      changed.emplace_back(name, value);
+    }
+    if (!can_round(crossed)) continue;
+    std::size_t run = changed.empty() ? 0 : settings.size();
+    for (const PrecisionRow& row : result.precision) {
+      if (changed.size() == 1 && row.knob->name == changed.front().first && row.value == changed.front().second)
+        run = row.run;
+    }
+    result.crossed.push_back({values, run});
+    if (run < settings.size()) continue;
+    settings.push_back(std::move(crossed));
+    result.runs.emplace_back();
+    for (const auto& [name, value] : changed)
+      result.runs.back().name += (result.runs.back().name.empty() ? "" : ",") + name + "=" + value;
   }
   return settings;
 }
 
 void climb_precisions(const AccuracyJob& job, const Workload& workload, const std::vector<PrecisionSettings>& settings,
-                      const ShownImage& reference, const BatchPlace& place, AccuracyResult& result,
+                      const Reference& reference, const BatchPlace& place, AccuracyResult& result,
                       ProgressLine& progress) {
+  const EnergyTable& energies = shipped_energies();
+  // The runs with one change come first.
+  std::size_t single = 1;
+  for (const PrecisionRow& row : result.precision) single = std::max(single, row.run + 1);
   std::vector<Task> tasks;
   for (std::size_t i = 0; i < settings.size(); ++i) {
     const PreprocessOptions options = settings[i].preprocess;
@@ -342,24 +416,95 @@ void climb_precisions(const AccuracyJob& job, const Workload& workload, const st
     PrecisionRun& run = result.runs[index];
     run.run = std::move(simulated.result);
     const ShownImage image = shown(*simulated.image, job.simulation.background);
-    run.error = image_error(image, reference);
+    run.error = image_error(image, reference.image);
+    const std::vector<double>& proved = reference.proved[index];
+    run.by_fragments = error_by_fragments(image, reference.image, reference.fragments, proved);
+    if (!proved.empty()) run.proved_max_error = *std::max_element(proved.begin(), proved.end());
+    run.l2_bytes = bytes_moved(run.run, "l2");
+    run.dram_bytes = bytes_moved(run.run, "dram");
+    const EnergyAmounts amounts = energy_amounts(run.run, energies);
+    if (amounts.is_known) run.millijoules = energy_report(amounts, energies).total;
     if (const StatisticReport* const stuck = statistic_named(run.run.statistics, "crop.pixels_stuck"))
       run.pixels_stuck = stuck->value;
     if (job.html) {
       run.picture = picture_of(image, picture_width);
-      run.error_map = error_map(image, reference, picture_width);
+      run.error_map = error_map(image, reference.image, picture_width);
     }
-    if (job.simulation.output) write_image(job, result, file_name(run.name), *simulated.image);
+    if (job.simulation.output && index < single) write_image(job, result, file_name(run.name), *simulated.image);
   });
 
   std::vector<TradeOff> trade_offs;
-  for (PrecisionRun& run : result.runs) {
+  for (PrecisionRun& run : result.runs)
     run.cycles_change_percent = error_percent(cycles_of(run.run), cycles_of(result.runs.front().run));
-    trade_offs.push_back({cycles_of(run.run).value_or(0), -run.error.psnr_db});
-  }
+  for (std::size_t i = 0; i < single; ++i)
+    trade_offs.push_back({cycles_of(result.runs[i].run).value_or(0), -result.runs[i].error.psnr_db});
   if (!result.runs.front().run.cycles) return;
   const std::vector<bool> front = pareto_front(trade_offs, precision_tolerance);
-  for (std::size_t i = 0; i < result.runs.size(); ++i) result.runs[i].on_front = front[i];
+  for (std::size_t i = 0; i < front.size(); ++i) result.runs[i].on_front = front[i];
+}
+
+/// Two near views, at `functional`: images depend on time in paper termination alone, and by no more than the threshold leaves.
+void measure_popping(const AccuracyJob& job, const Workload& workload, const std::vector<PrecisionSettings>& settings,
+                     const ShownImage& reference, const BatchPlace& place, AccuracyResult& result,
+                     ProgressLine& progress) {
+  if (workload.scene.draw_list || !result.base.variant.is_of_pipeline()) return;
+  const std::shared_ptr<const Draw> exact_draw = workload.draw_with(workload.options.exact());
+  if (exact_draw->splats.empty()) return;
+  // Splats go from the nearest to the farthest.
+  const auto depth = static_cast<double>(exact_draw->splats[exact_draw->splats.size() / 2].depth);
+  Workload next = workload;
+  Camera& camera = next.scene.viewpoint.camera;
+  const double near = camera.near_plane;
+  const double far = camera.far_plane;
+  // By which window positions are divided there: camera z, of its window depth, and 1 without perspective.
+  const double divisor = camera.projection == Projection::perspective ? near * far / (far - depth * (far - near)) : 1.0;
+  for (int axis = 0; axis < 3; ++axis)
+    camera.eye[axis] += camera.rotation[static_cast<std::size_t>(axis)].x * divisor / camera.fx;
+  next.draw = std::make_shared<const Draw>(preprocess_scene(next.scene, next.options).draw);
+  const ShownImage next_reference =
+      shown(render_exactly(*next.draw_with(next.options.exact())), job.simulation.background);
+
+  std::vector<Task> tasks;
+  const auto compare_views = [&](std::size_t run) {
+    result.popping.push_back({result.runs[run].name});
+    PrecisionSettings chosen = settings[run];
+    chosen.request.fidelity = Fidelity::functional;
+    for (const Workload* const view : {&workload, static_cast<const Workload*>(&next)}) {
+      tasks.push_back(
+          {result.popping.back().run, chosen.request, [view, options = chosen.preprocess](const RunRequest& own) {
+             return frame_of(own, view->draw_with(options));
+           }});
+    }
+  };
+  compare_views(0);
+  const std::vector<std::string> knobs{"depth_key_bits", "format", "attributes", "shading"};
+  for (const PrecisionRow& row : result.precision) {
+    if (row.run != 0 && std::find(knobs.begin(), knobs.end(), row.knob->name) != knobs.end()) compare_views(row.run);
+  }
+  std::vector<ShownImage> images(tasks.size());
+  const unsigned processes = std::min(job.simulation.processes, static_cast<unsigned>(tasks.size()));
+  run_tasks(tasks, true, processes, place, progress, [&](std::size_t index, Simulated&& simulated) {
+    images[index] = shown(*simulated.image, job.simulation.background);
+  });
+  for (std::size_t i = 0; i < result.popping.size(); ++i) {
+    PoppingRow& row = result.popping[i];
+    std::size_t popped = 0;
+    double squares = 0;
+    for (std::size_t pixel = 0; pixel < reference.rgb.size() / 3; ++pixel) {
+      double largest = 0;
+      for (std::size_t value = 3 * pixel; value < 3 * pixel + 3; ++value) {
+        const double change = images[2 * i + 1].rgb[value] - images[2 * i].rgb[value];
+        const double off = change - (next_reference.rgb[value] - reference.rgb[value]);
+        squares += off * off;
+        largest = std::max(largest, std::fabs(off));
+      }
+      row.max_abs = std::max(row.max_abs, largest);
+      popped += largest > 1 / 255.0 ? 1 : 0;
+    }
+    const auto values = static_cast<double>(reference.rgb.size());
+    row.rms = std::sqrt(squares / values);
+    row.share_of_pixels = 3 * static_cast<double>(popped) / values;
+  }
 }
 
 }  // namespace
@@ -380,11 +525,11 @@ AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) 
   const Workload workload = load(job, result);
   if (job.simulation.output) create_output_folder(*job.simulation.output, "--output");
   save_draw(job.simulation, *workload.draw);
+  const std::vector<PrecisionSettings> values = choose_values(job, workload.scene.draw_list.has_value(), result);
   progress.show("rendering the exact image");
-  const ShownImage reference = make_reference(job, workload, result);
+  const Reference reference = make_reference(job, workload, values, result);
 
   const std::vector<RunRequest> levels = fidelity_requests(job);
-  const std::vector<PrecisionSettings> values = choose_values(job, workload.scene.draw_list.has_value(), result);
   const std::vector<Task> stress = stress_tasks(job, workload, result);
   const std::size_t climbs = job.repeat * levels.size();
   const Stopwatch ladders;
@@ -392,6 +537,8 @@ AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) 
   climb_stress(job, stress, {"stress ", climbs, values.size(), ladders.seconds()}, result, progress);
   climb_precisions(job, workload, values, reference, {"precision ", climbs + stress.size(), 0, ladders.seconds()},
                    result, progress);
+  measure_popping(job, workload, values, reference.image,
+                  {"near views ", climbs + stress.size() + values.size(), 0, ladders.seconds()}, result, progress);
   if (!workload.scene.draw_list) {
     for (PrecisionRun& run : result.runs)
       add_preprocess_parameters(job.simulation.preprocess_parameters, result.scene, run.run);

@@ -11,6 +11,8 @@
 #include "host/progress_line.h"
 #include "image/image_error.h"
 #include "image/picture.h"
+#include "jobs/energy.h"
+#include "jobs/error_by_fragments.h"
 #include "jobs/precision_knobs.h"
 #include "jobs/simulation_job.h"
 #include "jobs/trade_off.h"
@@ -50,7 +52,12 @@ struct PrecisionRun {
   std::string name;  ///< KNOB=VALUE, or "default"
   RunResult run;
   ImageError error;                             ///< against the exact image
+  std::optional<double> proved_max_error;       ///< that no pixel passes; none where nothing is proved
+  std::vector<ErrorOfRange> by_fragments;       ///< by the exact number of a pixel
   std::uint64_t pixels_stuck = 0;               ///< below the termination threshold, by rounding
+  std::optional<std::uint64_t> l2_bytes;        ///< read and written; none where no L2 counts
+  std::optional<std::uint64_t> dram_bytes;      ///< the same
+  std::optional<Range> millijoules;             ///< none without time
   std::optional<double> cycles_change_percent;  ///< against the default; none without time
   bool on_front = false;                        ///< the Pareto front of cycles and PSNR; false without time
   Picture picture, error_map;                   ///< for the page; else empty
@@ -61,6 +68,21 @@ struct PrecisionRow {
   const PrecisionKnob* knob;
   std::string value;
   std::size_t run;  ///< 0 is the default
+};
+
+/// Values of several knobs at once, and the run that has them.
+struct CrossedRow {
+  std::vector<std::pair<std::string, std::string>> values;  ///< KNOB and VALUE
+  std::size_t run;
+};
+
+/// How an image changes from one view to the next, a step of the camera to the right by which what is at the middle depth moves by
+/// a pixel: how far that is from how the exact image changes. What is as wrong in both views is none of it; what pops is.
+struct PoppingRow {
+  std::string run;  ///< KNOB=VALUE, or "default"
+  double rms = 0;   ///< over all pixels and channels
+  double max_abs = 0;
+  double share_of_pixels = 0;  ///< of which a channel changes by over an 8-bit level too much or too little
 };
 
 /// A stress configuration of what was asked for: cycles at the most exact fidelity, and the errors of the others in the order
@@ -92,8 +114,11 @@ struct AccuracyResult {
   std::vector<FidelityLevel> fidelity;      ///< by variant, then from the least exact to the most
   std::vector<PrecisionRun> runs;           ///< the default first
   std::vector<PrecisionRow> precision;      ///< by knob
+  std::vector<CrossedRow> crossed;          ///< none in a quick look
+  std::vector<PoppingRow> popping;          ///< none of a draw list
   std::vector<std::string> knobs_left_out;  ///< those that mean nothing for a draw list
   std::vector<std::string> knobs_without_pipeline;  ///< those that mean nothing for what draws outside it
+  std::vector<std::string> values_never_measured;   ///< KNOB=VALUE, of which nobody knows the measured rounding
   std::vector<StressRow> stress;                    ///< by configuration, then by variant
   std::vector<StressLeftOut> stress_left_out;
   Picture reference;             ///< the exact image, for the page

@@ -75,7 +75,7 @@ std::vector<PrecisionKnob> make_knobs() {
   knobs.push_back({"format",
                    "--format ",
                    "what the colour target stores per channel",
-                   {"rgba8", "rgba16f", "rgba32f"},
+                   {"rgba8", "srgb8", "rgba16f", "rgba16", "rgba32f"},
                    "rgba8",
                    false,
                    [](const PrecisionSettings& settings) { return vrpipe::name_of(settings.request.format); },
@@ -102,17 +102,36 @@ std::vector<PrecisionKnob> make_knobs() {
   knobs.push_back(state_knob("subpixel_bits", "of vertex coordinates", {"4", "8", "12"}, ""));
   knobs.push_back(
       state_knob("exponential", "of the fragment shader", {"exact", "ex2", "fp16", "table256", "table16"}, "table16"));
+  knobs.push_back(state_knob("shading", "arithmetic of alpha and colour in the shader", {"fp32", "fp16"}, "fp16"));
+  knobs.push_back(state_knob("merging", "arithmetic of QM's merge", {"fp32", "fp16"}, ""));
+  knobs.push_back(state_knob("attributes", "format of what the shader loads of a splat", {"fp32", "fp16", "quantized"},
+                             "quantized"));
+  knobs.push_back(state_knob("export_format", "format of what the shader sends to CROP", {"fp32", "fp16"}, ""));
+  knobs.push_back(state_knob("alpha_max", "that the shader clamps alpha to", {"0.99", "0.999", "1"}, ""));
   knobs.push_back(preprocess_knob("depth_key_bits", "of the depths that splats are sorted by", {"32", "24", "16", "12"},
                                   "12", &PreprocessOptions::depth_key_bits));
   knobs.push_back(preprocess_knob("sh_degree", "highest degree of spherical harmonics evaluated", {"3", "2", "1", "0"},
                                   "0", &PreprocessOptions::sh_degree));
+  knobs.push_back({"dilation",
+                   "--set preprocess.dilation=",
+                   "of projected covariances, pixels^2",
+                   {"0.1", "0.3", "0.5"},
+                   "",
+                   true,
+                   [](const PrecisionSettings& settings) { return fmt::format("{}", settings.preprocess.dilation); },
+                   [](PrecisionSettings& settings, const std::string& value) {
+                     PreprocessParameters parameters;
+                     parameters.set("dilation", value);
+                     settings.preprocess.dilation = parameters.options().dilation;
+                   }});
   knobs.push_back(state_knob("splat_extent", "what is rasterised for a splat", {"obb", "aabb", "three_sigma"}, ""));
   knobs.push_back(variant_knob("quad_merging", "TGC and QRU merge overlapping quads", &Variant::quad_merging));
   knobs.push_back(
       variant_knob("early_termination", "ZROP and CROP terminate opaque pixels", &Variant::early_termination));
   // The same rates, latencies and instructions whatever they are set to; and preprocessing is before the draw.
-  const std::vector<std::string> free{"blend_rounding", "termination_compare", "subpixel_bits",
-                                      "exponential",    "depth_key_bits",      "sh_degree"};
+  const std::vector<std::string> free{
+      "blend_rounding", "termination_compare", "subpixel_bits",  "exponential", "shading", "merging",
+      "export_format",  "alpha_max",           "depth_key_bits", "sh_degree",   "dilation"};
   for (PrecisionKnob& knob : knobs) knob.is_of_pipeline = !knob.is_preprocessing && knob.name != "pruning_threshold";
   for (PrecisionKnob& knob : knobs) knob.is_charged = std::find(free.begin(), free.end(), knob.name) == free.end();
   return knobs;
@@ -123,6 +142,53 @@ std::vector<PrecisionKnob> make_knobs() {
 const std::vector<PrecisionKnob>& precision_knobs() {
   static const std::vector<PrecisionKnob> knobs = make_knobs();
   return knobs;
+}
+
+const std::vector<std::vector<std::pair<std::string, std::string>>>& precision_crossings() {
+  static const auto crossings = [] {
+    std::vector<std::vector<std::pair<std::string, std::string>>> all;
+    for (const char* format : {"rgba8", "rgba16f"}) {
+      for (const char* rounding : {"rne", "rtz"}) {
+        const auto add = [&](const char* merged, const char* merging) {
+          all.push_back(
+              {{"format", format}, {"blend_rounding", rounding}, {"quad_merging", merged}, {"merging", merging}});
+        };
+        add("off", "fp32");
+        add("on", "fp32");
+        add("on", "fp16");
+      }
+    }
+    return all;
+  }();
+  return crossings;
+}
+
+bool can_round(const PrecisionSettings& settings) {
+  const auto& knobs = precision_knobs();
+  const auto rounding =
+      std::find_if(knobs.begin(), knobs.end(), [](const PrecisionKnob& knob) { return knob.name == "blend_rounding"; });
+  return is_measured(settings.request.format) || rounding->value(settings) != "measured";
+}
+
+std::optional<DrawnPrecision> drawn_precision(const RunRequest& request) {
+  const DrawState state = draw_state_of(request);
+  const double visible = 1.0 / 255.0;
+  const bool is_cut =
+      state.splat_extent == SplatExtent::three_sigma || state.obb_padding < 0.7072F || state.obb_padding > 1.0F;
+  // Without pruning a larger box has more fragments.
+  const bool is_wider =
+      state.splat_extent != SplatExtent::oriented_box && static_cast<double>(state.pruning_threshold) < 0.999 * visible;
+  if (is_cut || is_wider || !request.units.empty() || !request.variant.is_of_pipeline() ||
+      !request.variant.changed_units.empty()) {
+    return std::nullopt;
+  }
+  DrawnPrecision drawn;
+  drawn.format = request.format;
+  drawn.device = device_precision_of(request);
+  drawn.merges = request.variant.quad_merging;
+  drawn.pruning_threshold = static_cast<double>(state.pruning_threshold);
+  if (request.variant.early_termination) drawn.termination_threshold = static_cast<double>(state.termination_threshold);
+  return drawn;
 }
 
 std::string readable_value(const PrecisionKnob& knob, const std::string& value) {

@@ -1,10 +1,13 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <vrpipe/platforms/simulation.h>
+#include <vrpipe/workloads/exact_image.h>
 #include <vrpipe/workloads/preprocess.h>
 
 namespace vrpipe::tools {
@@ -32,6 +35,17 @@ struct PrecisionKnob {
 
 /// All knobs, in the order of reports.
 const std::vector<PrecisionKnob>& precision_knobs();
+
+/// Whether the model knows how to round to the format: as measured it does for some.
+bool can_round(const PrecisionSettings& settings);
+
+/// By which a bound on the error of a run is proved; none where there is no proof: boxes that cut off what is visible, units of one's
+/// own, or no pipeline.
+std::optional<DrawnPrecision> drawn_precision(const RunRequest& request);
+
+/// Values of several knobs at once, KNOB and VALUE, of those that depend on one another: how a target of few bits rounds, how often it does,
+/// and in what it is merged.
+const std::vector<std::vector<std::pair<std::string, std::string>>>& precision_crossings();
 
 /// The value as people write it: n/255 for the thresholds that are one, else as it is.
 std::string readable_value(const PrecisionKnob& knob, const std::string& value);

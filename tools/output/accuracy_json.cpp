@@ -9,6 +9,7 @@
 #include <vrpipe/arithmetic/blend.h>
 
 #include "jobs/optional_json.h"
+#include "output/energy_report.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -39,6 +40,15 @@ Json fidelity_json(const FidelityLevel& level) {
 
 Json precision_json(const PrecisionRow& row, const PrecisionRun& run) {
   const bool free = run.cycles_change_percent && *run.cycles_change_percent == 0;
+  Json by_fragments = Json::array();
+  for (const ErrorOfRange& range : run.by_fragments) {
+    by_fragments.push_back({{"from", range.from},
+                            {"to", range.to},
+                            {"pixels", range.pixels},
+                            {"mean_abs_error", range.mean_abs_error},
+                            {"max_abs_error", range.max_abs_error},
+                            {"proved_max_abs_error", optional_json(range.proved_max_error)}});
+  }
   return {{"knob", row.knob->name},
           {"value", row.value},
           {"option", row.knob->option},
@@ -49,11 +59,16 @@ Json precision_json(const PrecisionRow& row, const PrecisionRun& run) {
           {"psnr_db", decibels_json(run.error.psnr_db)},
           {"ssim", run.error.ssim},
           {"max_abs_error", run.error.max_abs_error},
+          {"proved_max_abs_error", optional_json(run.proved_max_error)},
           {"pixels_differing_8bit", run.error.pixels_differing},
           {"share_differing_8bit", run.error.share_differing},
           {"pixels_stuck", run.pixels_stuck},
           {"cycles", cycles_json(run.run)},
           {"cycles_change_percent", optional_json(run.cycles_change_percent)},
+          {"l2_bytes", run.l2_bytes ? Json(*run.l2_bytes) : Json()},
+          {"dram_bytes", run.dram_bytes ? Json(*run.dram_bytes) : Json()},
+          {"millijoules", range_json(run.millijoules)},
+          {"by_fragments", std::move(by_fragments)},
           {"costs_no_time", run.cycles_change_percent ? Json(free) : Json()},
           {"host_seconds", run.run.host_seconds},
           {"cpu_seconds", run.run.cpu_seconds},
@@ -83,6 +98,24 @@ Json accuracy_json(const AccuracyResult& result) {
     stress_left_out.push_back({{"configuration", left_out.configuration}, {"reason", left_out.reason}});
   Json precision = Json::array();
   for (const PrecisionRow& row : result.precision) precision.push_back(precision_json(row, result.runs[row.run]));
+  Json crossed = Json::array();
+  for (const CrossedRow& row : result.crossed) {
+    const PrecisionRun& run = result.runs[row.run];
+    Json values = Json::object();
+    for (const auto& [knob, value] : row.values) values[knob] = value;
+    crossed.push_back({{"values", std::move(values)},
+                       {"psnr_db", decibels_json(run.error.psnr_db)},
+                       {"max_abs_error", run.error.max_abs_error},
+                       {"proved_max_abs_error", optional_json(run.proved_max_error)},
+                       {"pixels_stuck", run.pixels_stuck},
+                       {"cycles", cycles_json(run.run)},
+                       {"millijoules", range_json(run.millijoules)}});
+  }
+  Json popping = Json::array();
+  for (const PoppingRow& row : result.popping) {
+    popping.push_back(
+        {{"run", row.run}, {"rms", row.rms}, {"max_abs", row.max_abs}, {"share_over_8bit_level", row.share_of_pixels}});
+  }
   std::vector<std::string> left_out = result.knobs_left_out;
   left_out.insert(left_out.end(), result.knobs_without_pipeline.begin(), result.knobs_without_pipeline.end());
   Json json = head_json("vrpipe.accuracy/1", result.provenance, result.processes);
@@ -99,6 +132,7 @@ Json accuracy_json(const AccuracyResult& result) {
                {"precision_fidelity", vrpipe::name_of(result.base.fidelity)},
                {"precision_processes", result.processes},
                {"knobs_left_out", left_out},
+               {"values_never_measured", result.values_never_measured},
                {"tolerances",
                 {{"cpu_seconds_percent", 100 * fidelity_tolerance.cost_share},
                  {"cycles_error_percent", fidelity_tolerance.error},
@@ -107,7 +141,9 @@ Json accuracy_json(const AccuracyResult& result) {
                {"fidelity", std::move(fidelity)},
                {"stress", std::move(stress)},
                {"stress_left_out", std::move(stress_left_out)},
-               {"precision", std::move(precision)}});
+               {"precision", std::move(precision)},
+               {"crossed", std::move(crossed)},
+               {"popping", std::move(popping)}});
   return json;
 }
 

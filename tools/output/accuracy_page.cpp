@@ -136,7 +136,8 @@ std::string precision_plot(const AccuracyResult& result) {
   for (std::size_t k = 0; k < precision_knobs().size(); ++k) {
     const PrecisionKnob& knob = precision_knobs()[k];
     const char* const color = fidelity_colors[k % fidelity_colors.size()];
-    const Marker marker = k < fidelity_colors.size() ? Marker::circle : Marker::square;
+    constexpr Marker markers[] = {Marker::circle, Marker::square, Marker::triangle};
+    const Marker marker = markers[k / fidelity_colors.size()];
     bool seen = false;
     for (const PrecisionRow& row : result.precision) {
       if (row.knob != &knob || row.run == 0) continue;
@@ -154,6 +155,34 @@ std::string precision_plot(const AccuracyResult& result) {
   plot.legend.push_back({"front", "#4d5b6a", Marker::circle, false, true});
   plot.legend.push_back({"not on the front", "#4d5b6a", Marker::circle, true, false});
   return figure("image error against cycles", plot);
+}
+
+/// Full markers are measured, hollow ones proved.
+std::string fragments_plot(const AccuracyResult& result) {
+  Plot plot;
+  plot.description = "largest error against the fragments of a pixel, measured and proved";
+  plot.x = {"fragments of a pixel, at least (logarithmic)", true};
+  plot.y = {"largest error of a channel (logarithmic)", true};
+  const std::vector<const PrecisionRun*> runs = runs_by_fragments(result);
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const char* const color = fidelity_colors[i % fidelity_colors.size()];
+    PlotLine measured{{}, color, false}, proved{{}, color, true};
+    for (const ErrorOfRange& range : runs[i]->by_fragments) {
+      const auto add = [&](PlotLine& line, double error, bool is_proved) {
+        line.points.emplace_back(range.from, error);
+        plot.points.push_back({static_cast<double>(range.from), error, color, Marker::circle, is_proved, "",
+                               fmt::format("{} to {} fragments, {}: {} {:.2g}", range.from, range.to, runs[i]->name,
+                                           is_proved ? "proved" : "measured", error)});
+      };
+      add(measured, range.max_abs_error, false);
+      if (range.proved_max_error) add(proved, *range.proved_max_error, true);
+    }
+    plot.lines.push_back(std::move(measured));
+    plot.lines.push_back(std::move(proved));
+    plot.legend.push_back({runs[i]->name, color, Marker::circle, false, false});
+  }
+  plot.legend.push_back({"proved", "#4d5b6a", Marker::circle, true, true});
+  return figure("error against fragments", plot);
 }
 
 std::string error_scale() {
@@ -250,6 +279,9 @@ std::string accuracy_page(const AccuracyResult& result) {
             definition(precision_definition());
   }
   text += word_list(precision_summary(result)) + table(precision_table(result));
+  text += "<h3>" + fragments_title() + "</h3>\n" + fragments_plot(result) + table(fragments_table(result));
+  if (!result.crossed.empty()) text += "<h3>" + crossed_title() + "</h3>\n" + table(crossed_table(result));
+  if (!result.popping.empty()) text += "<h3>" + popping_title() + "</h3>\n" + table(popping_table(result));
 
   text += omitted_effects_section(result);
 

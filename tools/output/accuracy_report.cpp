@@ -49,12 +49,23 @@ std::string state_text(const AccuracyResult& result) {
   return text;
 }
 
+/// Of a bound: not rounded down.
+std::string two_digits_up(double value) {
+  const double unit = std::pow(10, std::floor(std::log10(value)) - 1);
+  return fmt::format("{:.2g}", value > 0 ? std::ceil(value / unit * (1 - 1e-9)) * unit : 0);
+}
+
+std::string megabytes(const std::optional<std::uint64_t>& bytes) {
+  return bytes ? fmt::format("{:.2f}", static_cast<double>(*bytes) / 1e6) : "-";
+}
+
 std::vector<std::string> precision_cells(const std::string& value, const PrecisionRun& run, bool is_default) {
   const bool free = run.cycles_change_percent && *run.cycles_change_percent == 0;
   return {value,
           decibels(run.error.psnr_db),
           fmt::format("{:.5f}", run.error.ssim),
           fmt::format("{:.2g}", run.error.max_abs_error),
+          run.proved_max_error ? two_digits_up(*run.proved_max_error) : "-",
           fmt::format("{:.2f}", 100 * run.error.share_differing),
           grouped(run.pixels_stuck),
           cycles_text(run.run),
@@ -62,6 +73,9 @@ std::vector<std::string> precision_cells(const std::string& value, const Precisi
           : free                      ? "none"
           : run.cycles_change_percent ? signed_percent(run.cycles_change_percent, 3)
                                       : "-",
+          megabytes(run.l2_bytes),
+          megabytes(run.dram_bytes),
+          run.millijoules ? fmt::format("{:.3g}", run.millijoules->nominal) : "-",
           fmt::format("{:.2f}", run.run.cpu_seconds),
           run.on_front ? "front" : ""};
 }
@@ -246,8 +260,8 @@ AccuracyTable stress_table(const AccuracyResult& result) {
 AccuracyTable precision_table(const AccuracyResult& result) {
   AccuracyTable table;
   table.group_heading = "knob";
-  table.heading = {"value", "PSNR, dB", "SSIM",   "max error", "8-bit differs, %",
-                   "stuck", "cycles",   "cost %", "CPU s",     ""};
+  table.heading = {"value",  "PSNR, dB", "SSIM", "max error", "proved", "8-bit differs, %", "stuck", "cycles", "cost %",
+                   "L2, MB", "DRAM, MB", "mJ",   "CPU s",     ""};
   table.rows.push_back(
       {"the default", precision_cells("everything", result.runs.front(), true), result.runs.front().on_front});
   for (const PrecisionRow& row : result.precision) {
@@ -257,6 +271,67 @@ AccuracyTable precision_table(const AccuracyResult& result) {
     const std::string group = fmt::format("{}, default {}", row.knob->name, readable_value(*row.knob, usual->value));
     const PrecisionRun& run = result.runs[row.run];
     table.rows.push_back({group, precision_cells(readable_value(*row.knob, row.value), run, false), run.on_front});
+  }
+  return table;
+}
+
+std::vector<const PrecisionRun*> runs_by_fragments(const AccuracyResult& result) {
+  std::vector<const PrecisionRun*> runs{&result.runs.front()};
+  for (const PrecisionRow& row : result.precision) {
+    if (row.run != 0 && row.knob->name == "format") runs.push_back(&result.runs[row.run]);
+  }
+  return runs;
+}
+
+std::string crossed_title() { return "Of several choices at once"; }
+
+AccuracyTable crossed_table(const AccuracyResult& result) {
+  AccuracyTable table;
+  table.group_heading = "format, rounding";
+  table.heading = {"QM", "merging", "PSNR, dB", "max error", "proved", "stuck", "cycles"};
+  for (const CrossedRow& row : result.crossed) {
+    const PrecisionRun& run = result.runs[row.run];
+    table.rows.push_back({row.values[0].second + ", " + row.values[1].second,
+                          {row.values[2].second, row.values[2].second == "off" ? "" : row.values[3].second,
+                           decibels(run.error.psnr_db), fmt::format("{:.2g}", run.error.max_abs_error),
+                           run.proved_max_error ? two_digits_up(*run.proved_max_error) : "-", grouped(run.pixels_stuck),
+                           cycles_text(run.run)},
+                          false});
+  }
+  return table;
+}
+
+std::string popping_title() { return "Between two near views: errors of how the image changes"; }
+
+AccuracyTable popping_table(const AccuracyResult& result) {
+  AccuracyTable table;
+  table.group_heading = "views";
+  table.heading = {"run", "rms", "max", "over an 8-bit level, % of pixels"};
+  for (const PoppingRow& row : result.popping) {
+    table.rows.push_back({"a pixel apart at the middle depth",
+                          {row.run, fmt::format("{:.2g}", row.rms), fmt::format("{:.2g}", row.max_abs),
+                           fmt::format("{:.2f}", 100 * row.share_of_pixels)},
+                          false});
+  }
+  return table;
+}
+
+std::string fragments_title() { return "Errors by the fragments of a pixel"; }
+
+AccuracyTable fragments_table(const AccuracyResult& result) {
+  AccuracyTable table;
+  table.group_heading = "run";
+  table.heading = {"fragments", "pixels", "mean error", "max error", "proved"};
+  for (const PrecisionRun* const run : runs_by_fragments(result)) {
+    for (const ErrorOfRange& range : run->by_fragments) {
+      table.rows.push_back({run->name,
+                            {range.from == range.to ? grouped(range.from)
+                                                    : fmt::format("{} to {}", grouped(range.from), grouped(range.to)),
+                             grouped(range.pixels), fmt::format("{:.2g}", range.mean_abs_error),
+                             fmt::format("{:.2g}", range.max_abs_error),
+                             range.proved_max_error ? two_digits_up(*range.proved_max_error) : "-"},
+                            false});
+    }
   }
   return table;
 }
@@ -379,6 +454,10 @@ std::vector<std::string> precision_summary(const AccuracyResult& result) {
   if (!result.knobs_left_out.empty()) {
     lines.push_back("left out, since a draw list is preprocessed already: " + joined(result.knobs_left_out));
   }
+  if (!result.values_never_measured.empty()) {
+    lines.push_back("left out, since no GPU's blender into that format has been measured: " +
+                    joined(result.values_never_measured));
+  }
   if (!result.knobs_without_pipeline.empty()) {
     lines.push_back("left out, since they are of the graphics pipeline: " + joined(result.knobs_without_pipeline));
   }
@@ -434,7 +513,15 @@ std::string accuracy_text(const AccuracyResult& result, const TextStyle& style) 
     text += "\n" + style.bold(stress_title(result)) + "\n\n" + text_of(stress_table(result), {0, 1, 2, 3}, style);
   for (const std::string& line : stress_notes(result)) text += line + "\n";
   text += "\n" + style.bold(precision_title(result)) + "\n\n";
-  text += text_of(precision_table(result), {0, 1, 3, 5, 6, 7, 9}, style) + "\n";
+  const AccuracyTable precision = precision_table(result);
+  text += text_of(precision, {0, 1, 3, 4, 7, 8, 13}, style) + "\n" + text_of(precision, {0, 6, 9, 10, 11, 12}, style) +
+          "\n";
+  text +=
+      "\n" + style.bold(fragments_title()) + "\n\n" + text_of(fragments_table(result), {0, 1, 2, 3, 4}, style) + "\n";
+  if (!result.crossed.empty())
+    text += style.bold(crossed_title()) + "\n\n" + text_of(crossed_table(result), {0, 1, 2, 3, 4, 5, 6}, style) + "\n";
+  if (!result.popping.empty())
+    text += style.bold(popping_title()) + "\n\n" + text_of(popping_table(result), {0, 1, 2, 3}, style) + "\n";
   if (const std::string verdict = precision_verdict(result); !verdict.empty()) text += verdict + "\n";
   for (const std::string& line : precision_summary(result)) text += line + "\n";
   if (result.runs.front().run.cycles) text += precision_definition() + "\n";
@@ -450,6 +537,9 @@ std::string accuracy_markdown(const AccuracyResult& result) {
   if (!result.stress.empty()) text += "\n" + stress_title(result) + ":\n\n" + markdown(stress_table(result)) + "\n";
   for (const std::string& line : stress_notes(result)) text += "* " + line + "\n";
   text += (result.stress_left_out.empty() ? "" : "\n") + markdown(precision_table(result)) + "\n";
+  text += fragments_title() + ":\n\n" + markdown(fragments_table(result)) + "\n";
+  if (!result.crossed.empty()) text += crossed_title() + ":\n\n" + markdown(crossed_table(result)) + "\n";
+  if (!result.popping.empty()) text += popping_title() + ":\n\n" + markdown(popping_table(result)) + "\n";
   for (const std::string& line : precision_summary(result)) text += "* " + line + "\n";
   return text;
 }

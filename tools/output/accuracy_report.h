@@ -25,6 +25,19 @@ AccuracyTable stress_table(const AccuracyResult& result);
 /// The default once, and below it every other value.
 AccuracyTable precision_table(const AccuracyResult& result);
 
+/// Of several values at once.
+AccuracyTable crossed_table(const AccuracyResult& result);
+std::string crossed_title();
+/// Between two near views.
+AccuracyTable popping_table(const AccuracyResult& result);
+std::string popping_title();
+/// Of the default and of every other format: how far pixels with so many fragments are off.
+AccuracyTable fragments_table(const AccuracyResult& result);
+/// The runs that it has, the default first.
+std::vector<const PrecisionRun*> runs_by_fragments(const AccuracyResult& result);
+/// What stands above it.
+std::string fragments_title();
+
 /// What accuracy costs on the fidelity ladder, in a sentence.
 std::string fidelity_verdict(const AccuracyResult& result);
 /// The same of the precision ladder; empty without time.

@@ -91,10 +91,21 @@ struct DrawState {
 bool operator==(const DrawState& a, const DrawState& b);
 inline bool operator!=(const DrawState& a, const DrawState& b) { return !(a == b); }
 
+/// In which format numbers are kept, or computed with: single precision, or binary16 after each operation.
+enum class NumberFormat : std::uint8_t { fp32, fp16 };
+/// How a splat's attributes reach the fragment shader: its centre always in single precision, the 2x2 matrix, opacity and colour in
+/// single precision, in binary16, or the matrix in binary16, opacity and colour as UNORM of 8 bits.
+enum class AttributeFormat : std::uint8_t { fp32, fp16, quantized };
+
 /// How exactly the hardware computes; no application sets it.
 struct DevicePrecision {
   BlendRounding blend_rounding = BlendRounding::rne;
   Exponential exponential = Exponential::ex2;
+  NumberFormat shading = NumberFormat::fp32;        ///< from a sample's distance of the centre on
+  NumberFormat merging = NumberFormat::fp32;        ///< of two fragments into one (QM)
+  NumberFormat export_format = NumberFormat::fp32;  ///< of what the shader sends to be blended
+  AttributeFormat attributes = AttributeFormat::fp32;
+  float alpha_max = 0.99F;     ///< that the shader clamps alpha to
   unsigned subpixel_bits = 8;  ///< of vertex coordinates (D3D11.3: 8)
 };
 

@@ -47,6 +47,33 @@ struct StateParameters : ParameterSet {
                      1,     source::open,  "the fragment shader's exponential"};
   Choice blend_rounding{*this, "blend_rounding", {"rne", "rtz", "measured"},
                         0,     source::open,     "of the blender into the target format"};
+  Choice shading{*this,
+                 "shading",
+                 {"fp32", "fp16"},
+                 0,
+                 "the published shader's",
+                 "of alpha and colour in the fragment shader, from the sample's distance of the centre on: fp16 rounds "
+                 "each operation"};
+  Choice merging{
+      *this, "merging",    {"fp32", "fp16"},
+      0,     source::open, "of two fragments into one (QM): in fp16 1 - alpha is rounded, and each multiply-add once"};
+  Choice attributes{*this,
+                    "attributes",
+                    {"fp32", "fp16", "quantized"},
+                    0,
+                    "the published renderer's",
+                    "of a splat, beside its centre: 2x2 matrix, opacity and colour; quantized: the matrix in fp16, "
+                    "opacity and colour as UNORM8. Of 40 bytes 24 are loaded, or 20"};
+  Choice export_format{*this, "export_format", {"fp32", "fp16"},
+                       0,     source::open,    "of the colours that the fragment shader sends to be blended"};
+  Real alpha_max{*this,
+                 "alpha_max",
+                 0.99,
+                 0.0,
+                 1.0,
+                 "alpha",
+                 "INRIA's renderer, forward.cu",
+                 "that the fragment shader clamps alpha to"};
   Choice depth_format{*this,
                       "depth_format",
                       {"d16", "d24", "d32f"},

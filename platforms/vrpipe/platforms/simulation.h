@@ -276,6 +276,8 @@ struct RunResult {
 DrawState draw_state_of(const RunRequest& request, const std::vector<Setting>& own = {});
 /// Of the depth target of a frame that is made for a request: `state.depth_format`.
 DepthFormat depth_format_of(const RunRequest& request);
+/// How exactly its hardware computes.
+DevicePrecision device_precision_of(const RunRequest& request);
 
 /// Runs one variant. What draws outside the pipeline draws what is projected already, in a target of its own, RGBA32F, and
 /// terminates by its own rule; its time is that of lists and rendering, in cycles of the platform. Checks conservation,

@@ -3,9 +3,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include <vrpipe/arithmetic/running_bound.h>
 #include <vrpipe/pipeline/draw.h>
+#include <vrpipe/pipeline/draw_state.h>
 
 namespace vrpipe {
 
@@ -27,5 +30,27 @@ struct ExactImage {
 /// @param threads  0: one per hardware thread
 /// @throws std::invalid_argument when the draw has triangles or is a mesh
 ExactImage render_exactly(const Draw& draw, unsigned threads = 0);
+
+/// How a pipeline draws, as far as its precision goes.
+struct DrawnPrecision {
+  ColorFormat format = ColorFormat::rgba16f;
+  DevicePrecision device;
+  bool merges = false;
+  double pruning_threshold = 1.0 / 255.0;
+  std::optional<double> termination_threshold;  ///< none: no pixel terminates
+};
+
+/// What render_exactly() gives, and how far a pipeline's image may be from it.
+struct BoundedImage {
+  ExactImage exact;
+  std::vector<std::uint32_t> fragments;         ///< of each pixel, with alpha from 1/255 on
+  std::vector<std::vector<PixelBound>> bounds;  ///< of each precision asked for, of each pixel
+};
+
+/// A pipeline that draws the same splats, covers the same samples (boxes padded, F5) and evaluates alpha from half axes in single
+/// precision is within these bounds: of the shader's alpha, of fragments that it may prune or not, of blending (F4), and of what is behind
+/// a pixel that may have terminated. docs/numerics.md has the proof. Colours are clamped where the format clamps.
+/// @throws std::invalid_argument as render_exactly()
+BoundedImage render_with_bounds(const Draw& draw, const std::vector<DrawnPrecision>& precisions, unsigned threads = 0);
 
 }  // namespace vrpipe
