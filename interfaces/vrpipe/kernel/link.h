@@ -29,8 +29,8 @@ struct StreamPayload {
   const Item* item = nullptr;  ///< transfer
   unsigned latency = 0;        ///< transfer: cycles that the sender's pipeline adds to those of the link
   unsigned credits = 0;        ///< credit
-  /// Between units that are not clocked (timed.h): the cycles in which it begins and ends, and how many it takes of the
-  /// link.
+  /// Between units that are not clocked (timed.h): the cycles in which it begins and ends, how many it takes of the
+  /// link, and whether its first part goes with the last of the item before it.
   Cycle at = never;
   Cycle last = never;
   unsigned beats = 1;
