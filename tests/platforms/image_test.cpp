@@ -12,7 +12,6 @@ using testing::run;
 using testing::same_image;
 using testing::strictly;
 
-
 struct Size {
   std::uint32_t width, height, splats;
 };

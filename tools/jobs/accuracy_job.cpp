@@ -458,8 +458,7 @@ void measure_popping(const AccuracyJob& job, const Workload& workload, const std
   const double far = camera.far_plane;
   // By which window positions are divided there: camera z, of its window depth, and 1 without perspective.
   const double divisor = camera.projection == Projection::perspective ? near * far / (far - depth * (far - near)) : 1.0;
-  for (int axis = 0; axis < 3; ++axis)
-    camera.eye[axis] += camera.rotation[static_cast<std::size_t>(axis)].x * divisor / camera.fx;
+  for (std::size_t axis = 0; axis < 3; ++axis) camera.eye[axis] += camera.rotation[axis].x * divisor / camera.fx;
   next.draw = std::make_shared<const Draw>(preprocess_scene(next.scene, next.options).draw);
   const ShownImage next_reference =
       shown(render_exactly(*next.draw_with(next.options.exact())), job.simulation.background);
