@@ -109,6 +109,8 @@ const std::vector<NotVaried>& parameters_not_varied() {
       {"*.random_seed", "tells only with random replacement, which is tried"},
       {"sm.mesh_instructions", "there are no meshes"},
       {"sm.alpha_threshold_instructions", "of software termination alone"},
+      {"state.merging", "takes no time of its own; `vrpipe accuracy` tries it"},
+      {"state.export_format", "takes no time of its own; `vrpipe accuracy` tries it"},
       {"wdx.*", "these platforms have one GPC, and no crossbar"},
       {"l1.*", "the slot is empty on these platforms; --unit l1=NAME puts a cache there"},
       {"link.prop.late.depth", "of tests after shading, which these frames do not have"},
