@@ -13,7 +13,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,33 +21,18 @@
 
 #include <vrpipe/arithmetic/random.h>
 #include <vrpipe/component/error.h>
-#include <vrpipe/pipeline/registry.h>
-#include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/draw_list.h>
 #include <vrpipe/workloads/scene.h>
 
 #include "support/data.h"
+#include "support/random_choices.h"
 
 namespace vrpipe {
 
 namespace {
 
-class Dice {
- public:
-  explicit Dice(std::uint64_t seed) : state_(seed) {}
-  std::uint64_t next() { return mix(state_++); }
-  std::uint32_t below(std::uint64_t count) { return static_cast<std::uint32_t>(next() % count); }
-  bool chance(unsigned percent) { return below(100) < percent; }
-  double real(double low, double high) { return low + (high - low) * static_cast<double>(next() >> 11U) * 0x1p-53; }
-  template <class Items>
-  const auto& one_of(const Items& items) {
-    return *(std::begin(items) + below(std::size(items)));
-  }
-
- private:
-  std::uint64_t state_;
-};
+using testing::Dice;
 
 struct Scene {
   std::string name;
@@ -56,17 +40,7 @@ struct Scene {
 };
 
 Scene window_of(const Draw& real, std::uint32_t left, std::uint32_t top, std::uint32_t side) {
-  Scene scene{fmt::format("measured-{}", side), {}};
-  scene.draw.width = scene.draw.height = side;
-  const auto reaches = [&](float at, float reach) { return at + reach >= 0 && at - reach <= static_cast<float>(side); };
-  for (Splat splat : real.splats) {
-    splat.cx -= static_cast<float>(left);
-    splat.cy -= static_cast<float>(top);
-    if (reaches(splat.cx, std::fabs(splat.ax) + std::fabs(splat.bx)) &&
-        reaches(splat.cy, std::fabs(splat.ay) + std::fabs(splat.by)))
-      scene.draw.splats.push_back(splat);
-  }
-  return scene;
+  return {fmt::format("measured-{}", side), testing::window_of(real, left, top, side, side)};
 }
 
 std::vector<Scene> load_scenes(bool is_short) {
@@ -91,24 +65,12 @@ std::vector<Scene> load_scenes(bool is_short) {
   return scenes;
 }
 
-std::vector<std::string> names_of(const Parameter& parameter) {
-  std::vector<std::string> names;
-  std::string rest = parameter.range().substr(std::strlen("one of "));
-  for (std::size_t comma; (comma = rest.find(", ")) != std::string::npos; rest = rest.substr(comma + 2))
-    names.push_back(rest.substr(0, comma));
-  names.push_back(rest);
-  return names;
-}
-
 std::string value_of(Dice& dice, const Parameter& parameter) {
   if (dynamic_cast<const Switch*>(&parameter) != nullptr) return dice.chance(50) ? "on" : "off";
-  if (dynamic_cast<const Choice*>(&parameter) != nullptr) return dice.one_of(names_of(parameter));
-  // `a whole number from 1 to 16`
+  if (dynamic_cast<const Choice*>(&parameter) != nullptr) return dice.one_of(testing::names_of(parameter));
   double low = 0;
   double high = 0;
-  const std::string range = parameter.range();
-  if (std::sscanf(range.c_str() + range.find(" from "), " from %lf to %lf", &low, &high) != 2)
-    throw std::logic_error("no bounds in " + range);
+  if (!testing::bounds_of(parameter, low, high)) throw std::logic_error("no bounds in " + parameter.range());
   const double usual = std::stod(parameter.value());
   const bool is_near = dice.chance(70);
   const double least = is_near ? std::max(low, usual / 16) : low;
@@ -118,18 +80,6 @@ std::string value_of(Dice& dice, const Parameter& parameter) {
   const double value = std::exp(dice.real(std::log(least + offset), std::log(most + offset))) - offset;
   const double kept = std::min(high, std::max(low, value));
   return is_whole ? fmt::format("{:.0f}", std::floor(kept + 0.5)) : fmt::format("{:.3f}", kept);
-}
-
-/// Whether the platform has a unit of the listing's slot and kind.
-bool is_of(const Platform& platform, const ParameterListing& listing) {
-  if (!Registry::instance().has_slot(listing.unit)) return listing.unit != "platform";
-  const Slot& slot = Registry::instance().slot(listing.unit);
-  Netlist netlist(platform.gpcs);
-  platform.wire(netlist);
-  return std::any_of(netlist.instances().begin(), netlist.instances().end(), [&](const Instance& instance) {
-    if (instance.slot != listing.unit) return false;
-    return listing.implementation == (instance.implementation.empty() ? slot.implementation : instance.implementation);
-  });
 }
 
 struct Case {
@@ -147,9 +97,11 @@ Case draw_case(std::uint64_t seed, std::uint64_t index, const std::vector<Scene>
   c.request.format = dice.one_of(formats);
   c.request.termination = dice.chance(40) ? Termination::strict : Termination::paper;
   std::vector<std::pair<std::string, const Parameter*>> all;
+  Netlist netlist(c.request.platform->gpcs);
+  c.request.platform->wire(netlist);
   const std::vector<ParameterListing> listings = list_parameters(c.request.platform);
   for (const ParameterListing& listing : listings) {
-    if (listing.pass_through || !is_of(*c.request.platform, listing)) continue;
+    if (listing.pass_through || listing.unit == "platform" || !testing::has_unit(netlist, listing)) continue;
     for (const Parameter* parameter : listing.parameters->parameters()) all.emplace_back(listing.unit, parameter);
   }
   for (unsigned count = 3 + dice.below(3); count > 0; --count) {

@@ -32,7 +32,7 @@ ColorFormat color_format_named(const std::string& name) {
 }
 
 void check_rounding(ColorFormat format, BlendRounding rounding) {
-  if (rounding != BlendRounding::measured || is_measured(format)) return;
+  if (can_round(format, rounding)) return;
   throw UserError(std::string("cannot round to ") + name_of(format) + " as measured", "state.blend_rounding, --format",
                   "no GPU's blender into that format has been measured", "use rne or rtz, or another format");
 }

@@ -8,6 +8,7 @@
 
 #include <vrpipe/memory/line_visits.h>
 #include <vrpipe/model/timed_cache_port.h>
+#include <vrpipe/model/timed_pins.h>
 #include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/order_monitor.h>
 
@@ -75,7 +76,7 @@ class TimedCrop : public TimedUnit {
     const ColorSurface* const surface = behaviour_->surface();
     if (surface == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
     monitor_ = std::make_unique<BlendOrderMonitor>(surface->width(), surface->height());
-    if (time_.cache.replacement != Replacement::lru && !time_.fetches_ahead()) pins_ = behaviour_->cache();
+    if (TimedPins::are_needed(time_.cache.replacement) && !time_.fetches_ahead()) pinned_cache_ = behaviour_->cache();
     if (time_.fetches_ahead()) uses_.resize(surface->size_bytes() / time_.cache.line_bytes + 1);
   }
 
@@ -119,7 +120,11 @@ class TimedCrop : public TimedUnit {
     SlotPool& places = fetches_ahead ? ahead_ : queue_;
     Cycle at = places.free_from(visible.first, 1);
     const Cycle has_places = places.free_from(std::max(at, visible.last), quads);
-    if (pins_ != nullptr) at = line_free_from(warp, from, at);
+    if (pinned_cache_ != nullptr) {
+      const std::uint64_t line = sectors_of(warp, from).line;
+      const std::uint64_t address = surface.address(tile) + line * time_.cache.line_bytes;
+      at = pins_.line_free_from(*pinned_cache_, address, port_open_from(std::max(at, look_ups_.next())));
+    }
     behaviour_->look_up(warp, from, to, cache_);
     for (unsigned line = 0; line < cache_.count && !fetches_ahead; ++line) {
       if (cache_.lines[line].replaced) at = std::max(at, stays_[cache_.lines[line].line].last_blend);
@@ -154,30 +159,12 @@ class TimedCrop : public TimedUnit {
     charge(UnitState::memory, blended.first);
     charge(UnitState::busy, blended.last + 1);
     queue_.take(quads, blended);
-    if (pins_ != nullptr) {
-      pins_->pin(cache_.lines[0].line);
-      pinned_.push({blended.last, cache_.lines[0].line});
-    }
+    if (pinned_cache_ != nullptr) pins_.pin(*pinned_cache_, cache_.lines[0].line, blended.last);
     any_blended_ = true;
     quads_last(blended.last + time_.latency_cycles, quads, [&](unsigned i) { return warp.draw[from + i]; });
     did(CropWork::blend, quads, blended.first, blended.last + 1);
     blend(warp, from, to, fetches_ahead, blended);
     return looked_up;
-  }
-
-  /// When a quad finds its line, or one that no queued quad needs, from a cycle on.
-  [[gnu::noinline]] Cycle line_free_from(const ShadedWarp& warp, unsigned index, Cycle at) {
-    const std::uint64_t line = time_.sectors_of_quads()[warp.position[index]].line;
-    const std::uint64_t address = behaviour_->surface()->address(warp.tile, 0) + line * time_.cache.line_bytes;
-    const auto finds_line = [&] {
-      return pins_->find(address) != SectoredCache::no_line || pins_->can_allocate(address);
-    };
-    at = port_open_from(std::max(at, look_ups_.next()));
-    for (; !pinned_.empty() && (pinned_.front().until <= at || !finds_line()); pinned_.pop()) {
-      at = std::max(at, pinned_.front().until);
-      pins_->unpin(pinned_.front().line);
-    }
-    return at;
   }
 
   /// Takes the time of quads whose sectors are there from a cycle on.
@@ -385,13 +372,8 @@ class TimedCrop : public TimedUnit {
   std::vector<Stay> stays_;
   std::vector<TimedLineUses> uses_;  ///< by line of the surface, where tags are looked at twice
   VisitCounter visits_;
-  struct Pinned {
-    Cycle until = 0;
-    std::uint32_t line = 0;
-  };
-  /// The cache, where the line that goes is not always the one whose last use is longest ago, and so is free first.
-  SectoredCache* pins_ = nullptr;
-  Ring<Pinned> pinned_;     ///< by queued quads
+  SectoredCache* pinned_cache_ = nullptr;  ///< where lines of queued quads are pinned
+  TimedPins pins_;
   unsigned signalled_ = 0;  ///< quads, in the last cycle with any
   Cycle signalled_at_ = never;
   Cycle end_ = never;

@@ -9,10 +9,10 @@
 #include "z_cache_statistics.h"
 
 #include <vrpipe/kernel/rate.h>
-#include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/line_visits.h>
 #include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/model/timed_cache_port.h>
+#include <vrpipe/model/timed_pins.h>
 
 namespace vrpipe {
 
@@ -34,7 +34,7 @@ class TimedZCache {
         late_(timing.quads_per_cycle, std::max(timing_.input_quads, quads_per_warp)),
         updates_(timing.updates_per_cycle),
         queued_updates_(timing_.input_updates),
-        pins_(timing_.organization.replacement != Replacement::lru && !timing_.fetches_ahead()),
+        pins_lines_(TimedPins::are_needed(timing_.organization.replacement) && !timing_.fetches_ahead()),
         lines_ahead_(std::max(timing_.fetch_ahead_lines, std::uint32_t{QuadBeat::capacity})) {}
 
   tlm::tlm_initiator_socket<32>& socket() { return port_.socket(); }
@@ -173,7 +173,7 @@ class TimedZCache {
     access.address = needed.address;
     access.sectors = needed.sectors;
     if (cleared_) access.known = cleared_->of_line(needed.address);
-    if (pins_) make_room(needed.address, times.at);
+    if (pins_lines_) times.at = pins_.line_free_from(*cache_, needed.address, times.at);
     cache_->look_up(access);
     if (cleared_) cleared_->count(access.missed & access.known);
     Cycle* const there = &there_[std::size_t{access.line} * sectors_of_a_line_];
@@ -195,19 +195,7 @@ class TimedZCache {
   /// A line does not go before a cycle.
   void keep(SectoredCache::Line line, Cycle until) {
     kept_until_[line] = std::max(kept_until_[line], until);
-    if (!pins_) return;
-    cache_->pin(line);
-    pinned_.push_in_order({until, line}, &Pinned::until);
-  }
-  /// Waits until an address finds its line, or one that may go.
-  [[gnu::noinline]] void make_room(std::uint64_t address, Cycle& at) {
-    const auto finds_line = [&] {
-      return cache_->find(address) != SectoredCache::no_line || cache_->can_allocate(address);
-    };
-    for (; !pinned_.empty() && (pinned_.front().until <= at || !finds_line()); pinned_.pop()) {
-      at = std::max(at, pinned_.front().until);
-      cache_->unpin(pinned_.front().line);
-    }
+    if (pins_lines_) pins_.pin(*cache_, line, until);
   }
   /// The second look at the lines of one primitive's quads, as ZLinesAhead's; returns when they are there.
   [[gnu::noinline]] Cycle look_again(const QuadBeat& beat, Cycle looked_up) {
@@ -269,13 +257,8 @@ class TimedZCache {
   std::optional<ClearedSectors> cleared_;
   BeatLines::Needed needed_;
   std::vector<Cycle> kept_until_;  ///< by line of the cache
-  struct Pinned {
-    Cycle until = 0;
-    SectoredCache::Line line = SectoredCache::no_line;
-  };
-  /// Whether lines are pinned, since the one that goes is not always the one whose last use is longest ago, and so is free first.
-  const bool pins_;
-  Ring<Pinned> pinned_;
+  const bool pins_lines_;
+  TimedPins pins_;
   std::vector<Cycle> there_;  ///< by sector
   Cycle fill_cycles_ = 0;     ///< of the last fill
   Cycle foreseen_until_ = 0;  ///< of updates

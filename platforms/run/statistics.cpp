@@ -19,6 +19,21 @@ const StatisticReport* statistic_named(const std::vector<StatisticReport>& stati
   return found == statistics.end() ? nullptr : &*found;
 }
 
+std::optional<std::uint64_t> memory_bytes_moved(const std::vector<StatisticReport>& statistics,
+                                                const std::string& memory) {
+  std::optional<std::uint64_t> bytes;
+  for (const StatisticReport& statistic : statistics) {
+    if (statistic.name.rfind(memory + ".", 0) != 0) continue;
+    for (const std::string ending : {"_bytes_read", "_bytes_written"}) {
+      if (statistic.name.size() > ending.size() &&
+          statistic.name.compare(statistic.name.size() - ending.size(), ending.size(), ending) == 0) {
+        bytes = bytes.value_or(0) + statistic.value;
+      }
+    }
+  }
+  return bytes;
+}
+
 StatisticCollector::Gathered& StatisticCollector::gathered(const StatisticReport& declared, const std::string& kind,
                                                            const std::optional<Histogram::Buckets>& buckets) {
   // Two implementations in instances of a kind may mean different things by a name; they are not added up.

@@ -34,7 +34,7 @@ TEST_P(InShaderColors, AreThoseOfAColourRopBitByBit) {
   RenderContext context = testing::context_of(draw, state);
   context.format = std::get<0>(GetParam());
   context.precision.blend_rounding = std::get<1>(GetParam());
-  if (context.precision.blend_rounding == BlendRounding::measured && !is_measured(context.format)) {
+  if (!can_round(context.format, context.precision.blend_rounding)) {
     for (const char* name : {"in-shader", "color-rop"}) EXPECT_THROW(made(name, context), UserError) << name;
     return;
   }

@@ -23,34 +23,18 @@
 #include "support/builders.h"
 #include "support/foreign_memory.h"
 #include "support/mixed_frames.h"
+#include "support/random_choices.h"
 
 namespace vrpipe::walk {
 
 namespace {
 
+using testing::bounds_of;
+using testing::Dice;
 using testing::draw_of;
+using testing::names_of;
 using testing::round_splat;
 using testing::splat_at;
-
-class Dice {
- public:
-  explicit Dice(std::uint64_t seed) : state_(seed) {}
-  std::uint64_t next() { return mix(state_++); }
-  std::uint32_t below(std::uint64_t count) { return static_cast<std::uint32_t>(next() % count); }
-  bool chance(unsigned percent) { return below(100) < percent; }
-  /// In [low, high).
-  double real(double low, double high) { return low + (high - low) * static_cast<double>(next() >> 11U) * 0x1p-53; }
-  float real(float low, float high) {
-    return static_cast<float>(real(static_cast<double>(low), static_cast<double>(high)));
-  }
-  template <class Items>
-  const auto& one_of(const Items& items) {
-    return *(std::begin(items) + below(std::size(items)));
-  }
-
- private:
-  std::uint64_t state_;
-};
 
 // Scenes.
 
@@ -89,19 +73,10 @@ Splat odd_splat(Dice& dice, float width, float height) {
 }
 
 /// What a trained scene shows in a window of its image, thinned out.
-Draw window_of(const Draw& real, Dice& dice, std::uint32_t width, std::uint32_t height, std::uint32_t count) {
-  const auto x = static_cast<float>(dice.below(real.width - width + 1));
-  const auto y = static_cast<float>(dice.below(real.height - height + 1));
-  Draw window = draw_of(width, height);
-  for (Splat splat : real.splats) {
-    splat.cx -= x;
-    splat.cy -= y;
-    const float reach_x = std::fabs(splat.ax) + std::fabs(splat.bx);
-    const float reach_y = std::fabs(splat.ay) + std::fabs(splat.by);
-    if (splat.cx + reach_x < 0 || splat.cx - reach_x > static_cast<float>(width)) continue;
-    if (splat.cy + reach_y < 0 || splat.cy - reach_y > static_cast<float>(height)) continue;
-    window.splats.push_back(splat);
-  }
+Draw thin_window_of(const Draw& real, Dice& dice, std::uint32_t width, std::uint32_t height, std::uint32_t count) {
+  const std::uint32_t x = dice.below(real.width - width + 1);
+  const std::uint32_t y = dice.below(real.height - height + 1);
+  Draw window = testing::window_of(real, x, y, width, height);
   const std::size_t step = window.splats.size() / std::max(1U, count) + 1;
   std::size_t kept = 0;
   for (std::size_t i = 0; i < window.splats.size(); i += step) window.splats[kept++] = window.splats[i];
@@ -137,7 +112,7 @@ Draw draw_scene(Dice& dice, const Draw& real) {
     case 5:
       for (std::uint32_t i = 0; i < count; ++i) draw.splats.push_back(odd_splat(dice, w, h));
       return draw;
-    case 6: return window_of(real, dice, width, height, count);
+    case 6: return thin_window_of(real, dice, width, height, count);
     default:  // one splat or none
       if (dice.chance(80)) draw.splats.push_back(round_splat(w / 2, h / 2, dice.real(0.3F, 20.0F), 0.9F));
       return draw;
@@ -147,13 +122,6 @@ Draw draw_scene(Dice& dice, const Draw& real) {
 // Values.
 
 std::string text_of(double value) { return fmt::format("{}", value); }
-
-/// The bounds of `a whole number from 1 to 16`.
-bool bounds_of(const Parameter& parameter, double& low, double& high) {
-  const std::string range = parameter.range();
-  const std::size_t from = range.find(" from ");
-  return from != std::string::npos && std::sscanf(range.c_str() + from, " from %lf to %lf", &low, &high) == 2;
-}
 
 std::string whole_value(Dice& dice, double low, double high, double usual) {
   // Bytes a cycle between those of whole quads.
@@ -179,16 +147,6 @@ std::string real_value(Dice& dice, double low, double high, double usual) {
     case 3: return text_of(high * std::exp(-dice.real(0.0, 12.0)));
     default: return text_of(dice.real(low, high));
   }
-}
-
-std::vector<std::string> names_of(const Parameter& parameter) {
-  std::vector<std::string> names;
-  std::string rest = parameter.range().substr(std::string("one of ").size());
-  for (std::size_t comma; (comma = rest.find(", ")) != std::string::npos; rest = rest.substr(comma + 2)) {
-    names.push_back(rest.substr(0, comma));
-  }
-  names.push_back(rest);
-  return names;
 }
 
 std::string allowed_value(Dice& dice, const Parameter& parameter) {
@@ -218,18 +176,12 @@ std::string refused_value(Dice& dice, const Parameter& parameter) {
 
 /// Whether the platform has a unit of the slot and kind (most have an L2 alone), or does without and says so.
 bool is_of(const Platform& platform, const ParameterListing& listing) {
-  const Registry& registry = Registry::instance();
-  if (!registry.has_slot(listing.unit)) return true;
-  const Slot& slot = registry.slot(listing.unit);
   Netlist netlist(platform.gpcs);
   platform.wire(netlist);
   const std::vector<std::string>& absent = netlist.absent();
-  if (std::find(absent.begin(), absent.end(), slot.name) != absent.end())
-    return listing.implementation == slot.implementation;
-  return std::any_of(netlist.instances().begin(), netlist.instances().end(), [&](const Instance& instance) {
-    if (instance.slot != listing.unit) return false;
-    return listing.implementation == (instance.implementation.empty() ? slot.implementation : instance.implementation);
-  });
+  if (std::find(absent.begin(), absent.end(), listing.unit) != absent.end())
+    return listing.implementation == Registry::instance().slot(listing.unit).implementation;
+  return testing::has_unit(netlist, listing);
 }
 
 /// Whether a machine can hold it: some declared maxima fit only one at a time.

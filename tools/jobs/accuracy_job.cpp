@@ -166,21 +166,6 @@ Reference make_reference(const AccuracyJob& job, const Workload& workload,
   return reference;
 }
 
-/// Read from a memory and written to it; none where it counts nothing.
-std::optional<std::uint64_t> bytes_moved(const RunResult& run, const std::string& memory) {
-  std::optional<std::uint64_t> bytes;
-  for (const StatisticReport& report : run.statistics) {
-    if (report.name.rfind(memory + ".", 0) != 0) continue;
-    for (const std::string ending : {"_bytes_read", "_bytes_written"}) {
-      if (report.name.size() > ending.size() &&
-          report.name.compare(report.name.size() - ending.size(), ending.size(), ending) == 0) {
-        bytes = bytes.value_or(0) + report.value;
-      }
-    }
-  }
-  return bytes;
-}
-
 /// A precision run's name as part of a file's.
 std::string file_name(std::string run) {
   std::replace(run.begin(), run.end(), '=', '-');
@@ -420,8 +405,8 @@ void climb_precisions(const AccuracyJob& job, const Workload& workload, const st
     const std::vector<double>& proved = reference.proved[index];
     run.by_fragments = error_by_fragments(image, reference.image, reference.fragments, proved);
     if (!proved.empty()) run.proved_max_error = *std::max_element(proved.begin(), proved.end());
-    run.l2_bytes = bytes_moved(run.run, "l2");
-    run.dram_bytes = bytes_moved(run.run, "dram");
+    run.l2_bytes = memory_bytes_moved(run.run.statistics, "l2");
+    run.dram_bytes = memory_bytes_moved(run.run.statistics, "dram");
     const EnergyAmounts amounts = energy_amounts(run.run, energies);
     if (amounts.is_known) run.millijoules = energy_report(amounts, energies).total;
     if (const StatisticReport* const stuck = statistic_named(run.run.statistics, "crop.pixels_stuck"))

@@ -121,7 +121,7 @@ class PathMaker {
     parts.push_back({"draw", path.raster, run.bottleneck ? run.bottleneck->unit : "nothing"});
     path.bound_by = longest(parts);
     path.counts = run.counts.named();
-    add_dram_bytes(run, path);
+    if (const auto moved = memory_bytes_moved(run.statistics, "dram")) path.bytes.emplace_back("draw", *moved);
     path.result_hash = run.result_hash;
     path.host_seconds = run.host_seconds;
     return path;
@@ -186,17 +186,6 @@ class PathMaker {
     }
     return std::max(sm, memory);
   }
-  /// Where the platform has one.
-  static void add_dram_bytes(const RunResult& run, FramePath& path) {
-    std::optional<std::uint64_t> bytes;
-    for (const StatisticReport& statistic : run.statistics) {
-      const bool is_moved = statistic.name.find("_bytes_read") != std::string::npos ||
-                            statistic.name.find("_bytes_written") != std::string::npos;
-      if (statistic.name.rfind("dram.", 0) == 0 && is_moved) bytes = bytes.value_or(0) + statistic.value;
-    }
-    if (bytes) path.bytes.emplace_back("draw", *bytes);
-  }
-
   double frequency_mhz_;
 };
 

@@ -164,10 +164,7 @@ const std::vector<std::vector<std::pair<std::string, std::string>>>& precision_c
 }
 
 bool can_round(const PrecisionSettings& settings) {
-  const auto& knobs = precision_knobs();
-  const auto rounding =
-      std::find_if(knobs.begin(), knobs.end(), [](const PrecisionKnob& knob) { return knob.name == "blend_rounding"; });
-  return is_measured(settings.request.format) || rounding->value(settings) != "measured";
+  return can_round(settings.request.format, device_precision_of(settings.request).blend_rounding);
 }
 
 std::optional<DrawnPrecision> drawn_precision(const RunRequest& request) {

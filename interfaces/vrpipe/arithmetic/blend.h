@@ -135,7 +135,10 @@ inline ChannelPairs blend_into_target(const ChannelPairs& destination, const Cha
 
 /// Whether a real GPU's blender into the format has been measured.
 constexpr bool is_measured(ColorFormat format) { return format != ColorFormat::rgba16 && format != ColorFormat::srgb8; }
-/// Throws UserError for `measured` of a format that has not been.
+constexpr bool can_round(ColorFormat format, BlendRounding rounding) {
+  return rounding != BlendRounding::measured || is_measured(format);
+}
+/// Throws UserError where it cannot.
 void check_rounding(ColorFormat format, BlendRounding rounding);
 
 /// The same for a rounding known only at run time; the measured model of a real GPU's blender is here alone. Throws

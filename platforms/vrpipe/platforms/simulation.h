@@ -185,6 +185,9 @@ struct StatisticReport {
 
 /// Null where nothing of that name was declared.
 const StatisticReport* statistic_named(const std::vector<StatisticReport>& statistics, const std::string& name);
+/// Read from a memory, l2 or dram, and written to it; none where it counts nothing.
+std::optional<std::uint64_t> memory_bytes_moved(const std::vector<StatisticReport>& statistics,
+                                                const std::string& memory);
 
 /// What was counted of one draw: of `Counts`, what is a draw's own. Over all draws of a frame each sums to the frame's.
 /// A merged quad is blended for the draw of its front quad, and counted as merged for that of its back quad.
