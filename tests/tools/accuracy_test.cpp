@@ -88,6 +88,7 @@ tools::AccuracyResult large_result() {
       level.quads_per_second = 123.4e6;
       level.cycles_error_percent = level.speedup_error_percent = -12.345;
       level.fragments_blended_error_percent = 0.00012;
+      level.run.expected_error_percent = 2.2;
       level.speedup = 12.345;
       level.image.psnr_db = 101.23;
       level.dominated = true;
@@ -368,6 +369,7 @@ TEST_F(Accuracy, FidelityHasEveryVariantAtEveryRung) {
       }
       const double cycles = level["cycles"];
       const double error = level["cycles_error_percent"];
+      EXPECT_EQ(level["expected_error_percent"].is_number(), fidelity == Fidelity::lt || fidelity == Fidelity::cycle);
       EXPECT_NEAR(error, 100 * (cycles / exact[variant.name] - 1), 1e-9);
       EXPECT_NEAR(level["speedup"].get<double>(), baseline[name_of(fidelity)] / cycles, 1e-9);
       EXPECT_NEAR(level["speedup_error_percent"].get<double>(),

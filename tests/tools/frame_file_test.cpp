@@ -257,8 +257,27 @@ TEST_F(FrameFile, AMeshOfTheCommandLineMakesAMixedFrame) {
   refused({"run", "--scene", "tiny.spl", "--mesh", "wall.obj"}, {"--mesh", "draw list"});
   refused({"run", "--scene", "four.ply", "--mesh", "missing.obj"}, {"missing.obj"});
   refused({"run", "--scene", "four.ply", "--mesh", "wall.obj", "--save-draw", "draw.spl"}, {"--save-draw", "meshes"});
-  refused({"accuracy", "--scene", "four.ply", "--mesh", "wall.obj"}, {"--mesh"});
+  refused({"accuracy", "--scene", "four.ply", "--mesh", "wall.obj", "--save-draw", "draw.spl"},
+          {"--save-draw", "meshes"});
   refused({"run", "--scene", "four.ply", "--mesh", "wall.obj", "--json", "wall.obj"}, {"--mesh", "same file"});
+}
+
+TEST_F(FrameFile, WithMeshesTheFidelityLadderIsOfThatFrameAndThereIsNoOther) {
+  std::vector<std::string> options{"accuracy", "--quick", "--scene", "four.ply", "--mesh", "wall.obj"};
+  options.insert(options.end(), from_the_origin.begin(), from_the_origin.end());
+  const json result = json_of(options);
+  EXPECT_GT(result["scene"]["triangles"], 0);
+  EXPECT_TRUE(result["precision"].empty());
+  EXPECT_NE(result["precision_left_out"].get<std::string>().find("meshes"), std::string::npos);
+  EXPECT_FALSE(result["stress"].empty());
+  std::vector<std::string> alone{"run", "--scene", "four.ply", "--mesh", "wall.obj", "--variant", "baseline"};
+  alone.insert(alone.end(), from_the_origin.begin(), from_the_origin.end());
+  for (const json& level : result["fidelity"]) {
+    if (level["variant"] != "baseline" || level["fidelity"] != "cycle") continue;
+    EXPECT_EQ(level["result_hash"], json_of(alone)["runs"][0]["result_hash"]);
+  }
+  options.insert(options.end(), {"--output", "images"});
+  refused(options, {"--output", "meshes"});
 }
 
 TEST_F(FrameFile, AFileInThePlaceOfABuiltInSceneIsRelativeToTheFileToo) {

@@ -17,6 +17,7 @@
 #include "host/output_file.h"
 #include "host/stopwatch.h"
 #include "jobs/comparison.h"
+#include "jobs/loaded_frame.h"
 #include "jobs/processes.h"
 #include "jobs/settings.h"
 
@@ -57,32 +58,30 @@ std::optional<double> cycles_of(const RunResult& run) {
   return run.cycles ? std::optional<double>(static_cast<double>(*run.cycles)) : std::nullopt;
 }
 
-/// The scene, and the one draw that most runs share.
+/// The scene, and the one frame that most runs share.
 struct Workload {
   OpenedScene scene;
   PreprocessOptions options;
-  std::shared_ptr<const Draw> draw;
-  std::shared_ptr<const Draw> stress_draw;  ///< the middle of it
+  FrameDescription description;
+  LoadedFrame frame;
+  LoadedFrame stress_frame;  ///< the middle of it
 
   std::shared_ptr<const Draw> draw_with(const PreprocessOptions& wanted) const {
-    if (wanted == options || scene.draw_list) return draw;
+    if (wanted == options || scene.draw_list) return frame.geometry.front();
     return std::make_shared<const Draw>(preprocess_scene(scene, wanted).draw);
   }
+  std::shared_ptr<const Frame> frame_with(const RunRequest& request, const PreprocessOptions& wanted) const {
+    LoadedFrame loaded = frame;
+    loaded.geometry.front() = draw_with(wanted);
+    return make_frame(request, description, loaded);
+  }
 };
-
-std::shared_ptr<const Frame> frame_of(const RunRequest& request, std::shared_ptr<const Draw> geometry) {
-  auto frame = std::make_shared<Frame>(geometry->width, geometry->height);
-  frame->draw(std::move(geometry), draw_state_of(request));
-  return frame;
-}
 
 Workload load(const AccuracyJob& job, AccuracyResult& result) {
   Workload workload;
   workload.scene = open_scene(job.simulation.scene);
-  if (!workload.scene.meshes.empty()) {
-    throw UserError("cannot measure accuracy", "--scene, --mesh",
-                    "it is measured against an exact image of splats alone", "take a scene without meshes");
-  }
+  if (!workload.scene.meshes.empty())
+    result.precision_left_out = "the scene has meshes, and an exact image is of splats alone";
   workload.options = job.simulation.scene.preprocess;
   if (workload.scene.draw_list) {
     result.full_width = workload.scene.draw_list->draw.width;
@@ -97,20 +96,20 @@ Workload load(const AccuracyJob& job, AccuracyResult& result) {
       camera.height = std::max(1U, camera.height / quick_divisor);
     }
   }
-  LoadedScene loaded = preprocess_scene(workload.scene, workload.options);
-  result.scene = std::move(loaded.summary);
-  result.viewpoint = loaded.viewpoint;
+  workload.description = frame_of_scene(job.simulation.scene.scene);
+  workload.frame = load_frame(workload.description, workload.scene, workload.options);
+  result.scene = workload.frame.summary;
+  result.viewpoint = workload.frame.viewpoint;
   result.preprocessing = job.simulation.preprocessing;
-  result.width = loaded.draw.width;
-  result.height = loaded.draw.height;
-  workload.draw = std::make_shared<const Draw>(std::move(loaded.draw));
-  workload.stress_draw = workload.draw;
+  result.width = workload.frame.width;
+  result.height = workload.frame.height;
+  workload.stress_frame = workload.frame;
   if (!workload.scene.draw_list) {
     Camera& camera = workload.scene.viewpoint.camera;
     const Camera whole = camera;
     camera.width = std::min(camera.width, stress_side);
     camera.height = std::min(camera.height, stress_side);
-    workload.stress_draw = std::make_shared<const Draw>(preprocess_scene(workload.scene, workload.options).draw);
+    workload.stress_frame = load_frame(workload.description, workload.scene, workload.options);
     camera = whole;
   }
   return workload;
@@ -227,8 +226,9 @@ void climb_fidelities(const AccuracyJob& job, const Workload& workload, const st
   std::vector<Task> tasks;
   for (unsigned round = 0; round < job.repeat; ++round) {
     for (const RunRequest& request : requests) {
-      tasks.push_back({request.variant.name + " " + vrpipe::name_of(request.fidelity), request,
-                       [&workload](const RunRequest& own) { return frame_of(own, workload.draw); }});
+      tasks.push_back(
+          {request.variant.name + " " + vrpipe::name_of(request.fidelity), request,
+           [&workload](const RunRequest& own) { return make_frame(own, workload.description, workload.frame); }});
     }
   }
   result.fidelity.resize(requests.size());
@@ -295,8 +295,10 @@ std::vector<Task> stress_tasks(const AccuracyJob& job, const Workload& workload,
       result.stress.push_back({configuration.name, request.variant.name, 0, {}});
       for (const Fidelity fidelity : stress_rungs) {
         request.fidelity = fidelity;
-        tasks.push_back({configuration.name + " " + vrpipe::name_of(fidelity), request,
-                         [&workload](const RunRequest& own) { return frame_of(own, workload.stress_draw); }});
+        tasks.push_back(
+            {configuration.name + " " + vrpipe::name_of(fidelity), request, [&workload](const RunRequest& own) {
+               return make_frame(own, workload.description, workload.stress_frame);
+             }});
       }
     }
   }
@@ -392,9 +394,8 @@ void climb_precisions(const AccuracyJob& job, const Workload& workload, const st
   std::vector<Task> tasks;
   for (std::size_t i = 0; i < settings.size(); ++i) {
     const PreprocessOptions options = settings[i].preprocess;
-    tasks.push_back({result.runs[i].name, settings[i].request, [&workload, options](const RunRequest& own) {
-                       return frame_of(own, workload.draw_with(options));
-                     }});
+    tasks.push_back({result.runs[i].name, settings[i].request,
+                     [&workload, options](const RunRequest& own) { return workload.frame_with(own, options); }});
   }
   result.processes = std::min(job.simulation.processes, static_cast<unsigned>(tasks.size()));
   run_tasks(tasks, true, result.processes, place, progress, [&](std::size_t index, Simulated&& simulated) {
@@ -444,7 +445,7 @@ void measure_popping(const AccuracyJob& job, const Workload& workload, const std
   // By which window positions are divided there: camera z, of its window depth, and 1 without perspective.
   const double divisor = camera.projection == Projection::perspective ? near * far / (far - depth * (far - near)) : 1.0;
   for (std::size_t axis = 0; axis < 3; ++axis) camera.eye[axis] += camera.rotation[axis].x * divisor / camera.fx;
-  next.draw = std::make_shared<const Draw>(preprocess_scene(next.scene, next.options).draw);
+  next.frame = load_frame(next.description, next.scene, next.options);
   const ShownImage next_reference =
       shown(render_exactly(*next.draw_with(next.options.exact())), job.simulation.background);
 
@@ -455,9 +456,8 @@ void measure_popping(const AccuracyJob& job, const Workload& workload, const std
     chosen.request.fidelity = Fidelity::functional;
     for (const Workload* const view : {&workload, static_cast<const Workload*>(&next)}) {
       tasks.push_back(
-          {result.popping.back().run, chosen.request, [view, options = chosen.preprocess](const RunRequest& own) {
-             return frame_of(own, view->draw_with(options));
-           }});
+          {result.popping.back().run, chosen.request,
+           [view, options = chosen.preprocess](const RunRequest& own) { return view->frame_with(own, options); }});
     }
   };
   compare_views(0);
@@ -507,11 +507,25 @@ AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) 
   result.base = base != requests.rend() ? *base : requests.back();
   progress.show("loading the scene");
   const Workload workload = load(job, result);
-  if (job.simulation.output) create_output_folder(*job.simulation.output, "--output");
-  save_draw(job.simulation, *workload.draw);
-  const std::vector<PrecisionSettings> values = choose_values(job, workload.scene.draw_list.has_value(), result);
-  progress.show("rendering the exact image");
-  const Reference reference = make_reference(job, workload, values, result);
+  for (const RunRequest& request : requests)
+    check_drawable(request, *make_frame(request, workload.description, workload.frame));
+  if (job.simulation.output) {
+    if (!result.precision_left_out.empty()) {
+      throw UserError("cannot write images", "--output",
+                      "they are those of the precision ladder, which there is none of: " + result.precision_left_out,
+                      "leave out --output");
+    }
+    create_output_folder(*job.simulation.output, "--output");
+  }
+  save_draw(job.simulation, workload.frame);
+  const bool has_precision = result.precision_left_out.empty();
+  std::vector<PrecisionSettings> values;
+  Reference reference;
+  if (has_precision) {
+    values = choose_values(job, workload.scene.draw_list.has_value(), result);
+    progress.show("rendering the exact image");
+    reference = make_reference(job, workload, values, result);
+  }
 
   const std::vector<RunRequest> levels = fidelity_requests(job);
   const std::vector<Task> stress = stress_tasks(job, workload, result);
@@ -519,10 +533,17 @@ AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) 
   const Stopwatch ladders;
   climb_fidelities(job, workload, levels, {"fidelity ", 0, stress.size() + values.size(), 0}, result, progress);
   climb_stress(job, stress, {"stress ", climbs, values.size(), ladders.seconds()}, result, progress);
-  climb_precisions(job, workload, values, reference, {"precision ", climbs + stress.size(), 0, ladders.seconds()},
-                   result, progress);
-  measure_popping(job, workload, values, reference.image,
-                  {"near views ", climbs + stress.size() + values.size(), 0, ladders.seconds()}, result, progress);
+  if (has_precision) {
+    climb_precisions(job, workload, values, reference, {"precision ", climbs + stress.size(), 0, ladders.seconds()},
+                     result, progress);
+    measure_popping(job, workload, values, reference.image,
+                    {"near views ", climbs + stress.size() + values.size(), 0, ladders.seconds()}, result, progress);
+  } else {
+    result.runs.resize(1);
+    for (const FidelityLevel& level : result.fidelity) {
+      if (level.run.request.variant.name == result.base.variant.name) result.runs.front().run = level.run;
+    }
+  }
   if (!workload.scene.draw_list) {
     for (PrecisionRun& run : result.runs)
       add_preprocess_parameters(job.simulation.preprocess_parameters, result.scene, run.run);

@@ -112,6 +112,7 @@ struct AccuracyResult {
   std::vector<Setting> preprocessing;       ///< what --set changed of it
   RunRequest base;                          ///< what the precision ladder varies: of the pipeline, if anything is
   std::vector<FidelityLevel> fidelity;      ///< by variant, then from the least exact to the most
+  std::string precision_left_out;           ///< why there is no precision ladder, only the default's run; or empty
   std::vector<PrecisionRun> runs;           ///< the default first
   std::vector<PrecisionRow> precision;      ///< by knob
   std::vector<CrossedRow> crossed;          ///< none in a quick look

@@ -30,7 +30,7 @@ struct LoadedFrame {
 /// Throws UserError as load_scene(), and for splats that a scene does not have.
 LoadedFrame load_frame(const FrameDescription& frame, const SceneRequest& options);
 
-/// The same of a frame of one scene (frame_of_scene) that is open already and no draw list, with its viewpoint.
+/// The same of a frame of one scene (frame_of_scene) that is open already, with its viewpoint.
 LoadedFrame load_frame(const FrameDescription& frame, const OpenedScene& scene, const PreprocessOptions& options);
 
 /// The frame of a request, which gives draws their states.

@@ -94,9 +94,13 @@ void check_outputs(const SimulationJob& job, const std::vector<std::string>& ima
   check_files_differ(job.inputs, outputs);
 }
 
-void save_draw(const SimulationJob& job, const Draw& draw) {
+void save_draw(const SimulationJob& job, const LoadedFrame& frame) {
   if (!job.save_draw) return;
-  write_draw_list(*job.save_draw, draw);
+  if (!frame.meshes.front().empty()) {
+    throw UserError("cannot save the draw", "--save-draw", "a draw list has splats alone, and the scene has meshes",
+                    "leave out --save-draw, or take a scene without meshes");
+  }
+  write_draw_list(*job.save_draw, *frame.geometry.front());
   note_written(job.save_draw->string());
 }
 
@@ -132,13 +136,7 @@ JobResult perform(const SimulationJob& job) {
     // What cannot be drawn is refused before anything is written.
     for (const RunRequest& request : job.requests) check_drawable(request, *frame_of(request));
     if (job.output) create_output_folder(*job.output, "--output");
-    if (job.save_draw) {
-      if (!loaded.meshes.front().empty()) {
-        throw UserError("cannot save the draw", "--save-draw", "a draw list has splats alone, and the scene has meshes",
-                        "leave out --save-draw, or take a scene without meshes");
-      }
-      save_draw(job, *loaded.geometry.front());
-    }
+    save_draw(job, loaded);
 
     std::vector<RunRequest> requests = job.requests;
     // Measuring effects repeats runs, and observers are of one.

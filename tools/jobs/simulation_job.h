@@ -9,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include <vrpipe/pipeline/draw.h>
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/scene.h>
 
@@ -20,6 +19,7 @@
 #include "jobs/event_log.h"
 #include "jobs/frame_file.h"
 #include "jobs/heat_maps.h"
+#include "jobs/loaded_frame.h"
 #include "jobs/page_material.h"
 #include "jobs/trace.h"
 
@@ -101,8 +101,8 @@ void check_outputs(const SimulationJob& job, const std::vector<std::string>& ima
 /// Where an image goes.
 ImageFiles image_files(const SimulationJob& job, const std::string& name);
 
-/// Writes the draw list of --save-draw, if there is one. Throws UserError.
-void save_draw(const SimulationJob& job, const Draw& draw);
+/// Writes the draw list of --save-draw, if there is one, of a frame of one scene. Throws UserError.
+void save_draw(const SimulationJob& job, const LoadedFrame& frame);
 
 /// Loads what is drawn, simulates, and writes the images and the draw list that the user asked for. One request is
 /// simulated in this process, several, and those that measure effects, in processes of their own. Throws UserError, CommandFailure or a fault.

@@ -241,6 +241,35 @@ std::string omitted_effects_section(const AccuracyResult& result) {
          effects_html(runs);
 }
 
+std::string precision_section(const AccuracyResult& result) {
+  std::string text = "<h2>Precision: how exact numbers are</h2>\n";
+  if (const std::string verdict = precision_verdict(result); !verdict.empty()) {
+    text += "<p class=\"verdict\">" + html_escaped(verdict) + ".</p>\n";
+  }
+  text += fmt::format(
+      "<p>{} at {} fidelity, with one choice changed at a time. Errors are against an image in double precision: no "
+      "tiles, no termination, all bands, exact order, alpha below 1/255 pruned. What lies further left takes the "
+      "modelled hardware less time, further up is more exact.</p>\n",
+      html_escaped(result.base.variant.name), vrpipe::name_of(result.base.fidelity));
+  if (result.runs.front().run.cycles) {
+    text += precision_plot(result) +
+            "<p class=\"subtle\">What lies on the default has no label; a point's name shows under the pointer.</p>\n" +
+            definition(precision_definition());
+  }
+  text += word_list(precision_summary(result)) + table(precision_table(result));
+  text += "<h3>" + fragments_title() + "</h3>\n" + fragments_plot(result) + table(fragments_table(result));
+  if (!result.crossed.empty()) text += "<h3>" + crossed_title() + "</h3>\n" + table(crossed_table(result));
+  if (!result.popping.empty()) text += "<h3>" + popping_title() + "</h3>\n" + table(popping_table(result));
+  return text;
+}
+
+std::string images_section(const AccuracyResult& result) {
+  return "<h2>Images and error maps</h2>\n"
+         "<p>Left the image, averaged to its size here; right where it is wrong, the largest error of each block of "
+         "pixels.</p>\n" +
+         error_scale() + figures(result);
+}
+
 }  // namespace
 
 std::string accuracy_page(const AccuracyResult& result) {
@@ -264,32 +293,11 @@ std::string accuracy_page(const AccuracyResult& result) {
     text += "<h3>" + html_escaped(stress_title(result)) + "</h3>\n" + table(stress_table(result));
   text += word_list(stress_notes(result));
 
-  text += "<h2>Precision: how exact numbers are</h2>\n";
-  if (const std::string verdict = precision_verdict(result); !verdict.empty()) {
-    text += "<p class=\"verdict\">" + html_escaped(verdict) + ".</p>\n";
-  }
-  text += fmt::format(
-      "<p>{} at {} fidelity, with one choice changed at a time. Errors are against an image in double precision: no "
-      "tiles, no termination, all bands, exact order, alpha below 1/255 pruned. What lies further left takes the "
-      "modelled hardware less time, further up is more exact.</p>\n",
-      html_escaped(result.base.variant.name), vrpipe::name_of(result.base.fidelity));
-  if (result.runs.front().run.cycles) {
-    text += precision_plot(result) +
-            "<p class=\"subtle\">What lies on the default has no label; a point's name shows under the pointer.</p>\n" +
-            definition(precision_definition());
-  }
-  text += word_list(precision_summary(result)) + table(precision_table(result));
-  text += "<h3>" + fragments_title() + "</h3>\n" + fragments_plot(result) + table(fragments_table(result));
-  if (!result.crossed.empty()) text += "<h3>" + crossed_title() + "</h3>\n" + table(crossed_table(result));
-  if (!result.popping.empty()) text += "<h3>" + popping_title() + "</h3>\n" + table(popping_table(result));
-
+  text += result.precision_left_out.empty()
+              ? precision_section(result)
+              : "<p class=\"notice\">No precision ladder: " + html_escaped(result.precision_left_out) + ".</p>\n";
   text += omitted_effects_section(result);
-
-  text += "<h2>Images and error maps</h2>\n";
-  text +=
-      "<p>Left the image, averaged to its size here; right where it is wrong, the largest error of each block of "
-      "pixels.</p>\n";
-  text += error_scale() + figures(result);
+  if (result.precision_left_out.empty()) text += images_section(result);
   text += fmt::format(
       "<h2>What made this page</h2>\n<p><code>{}</code></p>\n<p class=\"subtle\">vrpipe {}; {:.0f} s, with {} "
       "simulation{} of the precision ladder at a time, on a host whose load average was {:.1f}.</p>\n",

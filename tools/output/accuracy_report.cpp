@@ -229,7 +229,8 @@ AccuracyTable fidelity_table(const AccuracyResult& result) {
                    "Mquads/s",
                    "events",
                    "blended +- %",
-                   "image PSNR, dB"};
+                   "image, dB",
+                   "says, %"};
   for (const FidelityLevel& level : result.fidelity) {
     const RunResult& run = level.run;
     table.rows.push_back(
@@ -240,7 +241,8 @@ AccuracyTable fidelity_table(const AccuracyResult& result) {
           level.dominated ? "yes" : "",
           run.request.variant.is_of_pipeline() ? fmt::format("{:.2f}", level.quads_per_second * 1e-6) : "-",
           grouped(run.kernel_events), signed_percent(level.fragments_blended_error_percent),
-          decibels(level.image.psnr_db)},
+          decibels(level.image.psnr_db),
+          run.expected_error_percent ? fmt::format("{:.1f}", *run.expected_error_percent) : "-"},
          false});
   }
   return table;
@@ -498,21 +500,8 @@ std::string precision_title(const AccuracyResult& result) {
                      result.processes == 1 ? "" : "s");
 }
 
-}  // namespace
-
-std::string accuracy_text(const AccuracyResult& result, const TextStyle& style) {
-  std::string text;
-  for (const std::string& line : accuracy_heading(result)) text += (text.empty() ? style.bold(line) : line) + "\n";
-  const AccuracyTable fidelity = fidelity_table(result);
-  text += "\n" + style.bold(fidelity_title(result)) + "\n\n";
-  text +=
-      text_of(fidelity, {0, 1, 2, 3, 4, 5, 6}, style) + "\n" + text_of(fidelity, {0, 7, 8, 9, 10, 11}, style) + "\n";
-  for (const std::string& line : fidelity_summary(result)) text += line + "\n";
-  text += fidelity_definition(result) + "\n";
-  if (!result.stress.empty())
-    text += "\n" + style.bold(stress_title(result)) + "\n\n" + text_of(stress_table(result), {0, 1, 2, 3}, style);
-  for (const std::string& line : stress_notes(result)) text += line + "\n";
-  text += "\n" + style.bold(precision_title(result)) + "\n\n";
+std::string precision_text(const AccuracyResult& result, const TextStyle& style) {
+  std::string text = "\n" + style.bold(precision_title(result)) + "\n\n";
   const AccuracyTable precision = precision_table(result);
   text += text_of(precision, {0, 1, 3, 4, 7, 8, 13}, style) + "\n" + text_of(precision, {0, 6, 9, 10, 11, 12}, style) +
           "\n";
@@ -525,8 +514,29 @@ std::string accuracy_text(const AccuracyResult& result, const TextStyle& style) 
   if (const std::string verdict = precision_verdict(result); !verdict.empty()) text += verdict + "\n";
   for (const std::string& line : precision_summary(result)) text += line + "\n";
   if (result.runs.front().run.cycles) text += precision_definition() + "\n";
-  text += fmt::format("took {:.1f} s, {:.1f} s of it for the exact image\n", result.seconds, result.reference_seconds);
   return text;
+}
+
+}  // namespace
+
+std::string accuracy_text(const AccuracyResult& result, const TextStyle& style) {
+  std::string text;
+  for (const std::string& line : accuracy_heading(result)) text += (text.empty() ? style.bold(line) : line) + "\n";
+  const AccuracyTable fidelity = fidelity_table(result);
+  text += "\n" + style.bold(fidelity_title(result)) + "\n\n";
+  text += text_of(fidelity, {0, 1, 2, 3, 4, 5, 6}, style) + "\n" + text_of(fidelity, {0, 7, 8, 9, 10, 11, 12}, style) +
+          "\n";
+  for (const std::string& line : fidelity_summary(result)) text += line + "\n";
+  text += fidelity_definition(result) + "\n";
+  if (!result.stress.empty())
+    text += "\n" + style.bold(stress_title(result)) + "\n\n" + text_of(stress_table(result), {0, 1, 2, 3}, style);
+  for (const std::string& line : stress_notes(result)) text += line + "\n";
+  text += result.precision_left_out.empty() ? precision_text(result, style)
+                                            : "\nno precision ladder: " + printable(result.precision_left_out) + "\n";
+  text += fmt::format("took {:.1f} s", result.seconds);
+  if (result.reference_seconds > 0)
+    text += fmt::format(", {:.1f} s of it for the exact image", result.reference_seconds);
+  return text + "\n";
 }
 
 std::string accuracy_markdown(const AccuracyResult& result) {
@@ -536,6 +546,7 @@ std::string accuracy_markdown(const AccuracyResult& result) {
   for (const std::string& line : fidelity_summary(result)) text += "* " + line + "\n";
   if (!result.stress.empty()) text += "\n" + stress_title(result) + ":\n\n" + markdown(stress_table(result)) + "\n";
   for (const std::string& line : stress_notes(result)) text += "* " + line + "\n";
+  if (!result.precision_left_out.empty()) return text + "* no precision ladder: " + result.precision_left_out + "\n";
   text += (result.stress_left_out.empty() ? "" : "\n") + markdown(precision_table(result)) + "\n";
   text += fragments_title() + ":\n\n" + markdown(fragments_table(result)) + "\n";
   if (!result.crossed.empty()) text += crossed_title() + ":\n\n" + markdown(crossed_table(result)) + "\n";
