@@ -222,7 +222,7 @@ class RunAhead::RepeatingZrop final : public ZropBehaviour {
   void update(const TerminationSignal& signal) override { zrop_->update(signal); }
   void pass(Mark mark) override { zrop_->pass(mark); }
   void follow(FunctionalRunAhead& run_ahead) override { zrop_->follow(run_ahead); }
-  TimingParameters timing() const override { return zrop_->timing(); }
+  const ZropTime& time() const override { return zrop_->time(); }
 
  private:
   std::unique_ptr<ZropBehaviour> zrop_;

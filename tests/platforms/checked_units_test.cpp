@@ -444,7 +444,7 @@ struct ZropForDraw0 : ZropBehaviour {
   }
   void pass(Mark mark) override { unit_.pass(mark); }
   void follow(FunctionalRunAhead& run_ahead) override { unit_.follow(run_ahead); }
-  TimingParameters timing() const override { return unit_.timing(); }
+  const ZropTime& time() const override { return unit_.time(); }
   DepthStencilRop unit_;
 };
 struct SmForDraw0 : SmBehaviour {

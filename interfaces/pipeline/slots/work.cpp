@@ -4,7 +4,6 @@
 #include <vrpipe/pipeline/slots/tgc.h>
 #include <vrpipe/pipeline/slots/vpo.h>
 #include <vrpipe/pipeline/slots/wdx.h>
-#include <vrpipe/pipeline/slots/zrop.h>
 
 namespace vrpipe {
 
@@ -29,14 +28,6 @@ std::vector<WorkKind> WdxWork::kinds(const WdxBehaviour::Timing& timing, unsigne
 
 std::vector<WorkKind> TgcWork::kinds(const Throughput& timing) {
   return {{"bin entries", 0, per(timing.items_per_cycle), throughput}, {"read-out", 1, 1.0, false}};
-}
-
-std::vector<WorkKind> ZropWork::kinds(const ZropBehaviour::TimingParameters& timing) {
-  return {{"tests", 0, per(timing.quads_per_cycle), throughput},
-          {"updates", 0, 1.0, false},
-          {"sectors", 0, per(timing.z_cache.sectors_per_cycle), false},
-          {"late tests", 0, per(timing.quads_per_cycle), throughput},
-          {"blocks", 0, per(1000), false}};
 }
 
 std::vector<WorkKind> QruWork::kinds(const Throughput& timing) {
