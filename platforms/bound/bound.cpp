@@ -39,7 +39,7 @@ void Work::add(const Work& other) {
 }
 
 PhaseBound::PhaseBound(const Configuration& configuration, const UntimedGpu& gpu, unsigned gpc) : pipeline_(gpu, gpc) {
-  if (unit(Pipeline::sm)) sm_ = dynamic_cast<SmBehaviour&>(unit(Pipeline::sm)->behaviour()).timing();
+  if (unit(Pipeline::sm)) sm_ = &dynamic_cast<SmBehaviour&>(unit(Pipeline::sm)->behaviour()).time();
   const Netlist& netlist = configuration.netlist();
   for (const UntimedGpu::Placed& placed : gpu.units()) {
     if (placed.instance->gpc != gpc && !placed.instance->in_front_end) continue;
@@ -62,7 +62,7 @@ PhaseBound::PhaseBound(const Configuration& configuration, const UntimedGpu& gpu
 }
 
 std::uint64_t PhaseBound::instructions_of(FragmentShader shader) const {
-  return instructions_in(sm_.fragment_program(shader));
+  return sm_ == nullptr ? 0 : instructions_in(sm_->fragment_program(shader));
 }
 
 std::uint64_t PhaseBound::collected(const Work& done) const {
@@ -87,11 +87,13 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
   };
   std::array<double, stages> cycles{};
   cycles[draw] = least(Pipeline::draw, done, to_last);
-  // Vertices are assembled once their attributes are sent; so many of these may still be on their way.
-  const std::uint64_t sent = std::uint64_t{sm_.fetch.attribute_writes} * sm_.fetch.l1.line_bytes;
-  cycles[vpo] = std::max(least(Pipeline::vpo, done, to_last),
-                         ratio(done.attribute_bytes_written - std::min(done.attribute_bytes_written, sent),
-                               std::uint64_t{sm_.cores} * sm_.fetch.core_bytes));
+  cycles[vpo] = least(Pipeline::vpo, done, to_last);
+  if (sm_ != nullptr) {
+    // Vertices are assembled once their attributes are sent; so many of these may still be on their way.
+    const std::uint64_t sent = std::uint64_t{sm_->fetch.attribute_writes} * sm_->fetch.l1.line_bytes;
+    const std::uint64_t written = done.attribute_bytes_written - std::min(done.attribute_bytes_written, sent);
+    cycles[vpo] = std::max(cycles[vpo], ratio(written, sm_->memory_bytes_per_cycle()));
+  }
   cycles[tgc] = least(Pipeline::tgc, done, to_last);
   cycles[raster] = least(Pipeline::raster, done, to_last);
   cycles[tc] = least(Pipeline::tc, done, to_last);

@@ -117,7 +117,7 @@ class PhaseBound {
   double idle_after_last(unsigned stage) const;
 
   const Pipeline pipeline_;
-  SmBehaviour::TimingParameters sm_{};
+  const SmTime* sm_ = nullptr;  ///< where there is one
   std::string memory_;
   std::uint32_t memory_bytes_per_cycle_ = 0;  ///< 0: a memory of which nothing is known
   BoundTerms terms_;

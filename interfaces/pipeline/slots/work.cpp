@@ -1,6 +1,5 @@
 #include <vrpipe/pipeline/slots/draw.h>
 #include <vrpipe/pipeline/slots/qru.h>
-#include <vrpipe/pipeline/slots/sm.h>
 #include <vrpipe/pipeline/slots/tgc.h>
 #include <vrpipe/pipeline/slots/vpo.h>
 #include <vrpipe/pipeline/slots/wdx.h>
@@ -32,15 +31,6 @@ std::vector<WorkKind> TgcWork::kinds(const Throughput& timing) {
 
 std::vector<WorkKind> QruWork::kinds(const Throughput& timing) {
   return {{"quads", 0, per(timing.items_per_cycle), throughput}, {"launches", 0, 1.0, false}};
-}
-
-std::vector<WorkKind> SmWork::kinds(const SmBehaviour::TimingParameters& timing) {
-  const double issue = per(timing.instructions_per_cycle());
-  return {{"vertices", 0, issue, throughput},
-          {"fragments", 0, issue, throughput},
-          {"merging", 0, issue, throughput},
-          {"launches", 1, per(1000), false},
-          {"visits", 2, per(1000), false}};
 }
 
 }  // namespace vrpipe
