@@ -55,7 +55,7 @@ struct PropTime {
     return {{"bins", 0, 1.0 / quads_per_cycle, false},
             {"survivors", 1, 1.0 / quads_per_cycle, false},
             {"colours", 2, 1.0 / color_rate.per_cycle(), true},
-            {"empty warps", 2, 1.0, false},
+            {"empty warps", 2, 1.0 / color_rate.items, false},
             {"late tests", 3, 1.0 / quads_per_cycle, false}};
   }
 };

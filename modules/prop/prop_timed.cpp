@@ -166,7 +166,7 @@ class TimedProp : public TimedUnit {
     } else {
       // A warp without survivors takes the cycle in which it is passed over, or what quads before it have left of that.
       left = std::max(from, color_.next());
-      if (color_.taken_of(left) == 0) did(PropWork::empty_warps, 1, left);
+      if (color_.taken_of(left) == 0) did(PropWork::empty_warps, time_.color_rate.items, left);
       color_.hold(left + 1);
       warp.release();
     }

@@ -130,10 +130,10 @@ class PropUnit : public Unit {
         if (!is_back_) order_.leave(current_.turn);
         out_release_.push({warp.slot});
         moved = true;
-        // A warp without survivors takes the cycle in which it is passed over.
+        // A warp without survivors takes the cycle in which it is passed over, but for the fraction that the next quad has of it.
         if (warp.count == 0) {
           warp.release();
-          if (sent == 0) did(PropWork::empty_warps, 1, now);
+          if (sent == 0) did(PropWork::empty_warps, color_limit_.lose_rest(), now);
           break;
         }
       }

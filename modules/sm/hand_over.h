@@ -15,8 +15,7 @@ namespace vrpipe {
 /// warp of pairs, a primitive's quads are one visit, whatever is between them: assumed, since no GPU merges.
 class HandOver {
  public:
-  HandOver(const SmBehaviour::TimingParameters& timing, const RenderContext& context)
-      : context_(context), price_(timing.hand_over) {}
+  HandOver(const SmTime& time, const RenderContext& context) : context_(context), price_(time.hand_over) {}
   bool is_on() const { return price_.is_on(); }
   /// In thousandths of a cycle.
   struct Price {

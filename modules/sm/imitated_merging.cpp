@@ -20,12 +20,8 @@ ImitatedMerging::ImitatedMerging(const Parameters& parameters, const RenderConte
       context_(context),
       paired_(parameters.paired_quads.thousandths()),
       discarded_(parameters.discarded_quads.thousandths()),
-      several_draws_(context.frame->draws().size() > 1) {}
-
-SmBehaviour::TimingParameters ImitatedMerging::timing() const {
-  TimingParameters timing = SplatShader::timing();
-  if (paired_ > 0) timing.fragment.insert(timing.fragment.end(), timing.merge.begin(), timing.merge.end());
-  return timing;
+      several_draws_(context.frame->draws().size() > 1) {
+  if (paired_ > 0) time_.fragment.insert(time_.fragment.end(), time_.merge.begin(), time_.merge.end());
 }
 
 void ImitatedMerging::shade(const Warp& warp, ShadedWarp& out) {

@@ -31,7 +31,6 @@ class ImitatedMerging : public SplatShader {
   ImitatedMerging(const Parameters& parameters, const RenderContext& context);
 
   void shade(const Warp& warp, ShadedWarp& out) override;
-  TimingParameters timing() const override;
 
  private:
   /// A part of its own: no other SM array lacks it.

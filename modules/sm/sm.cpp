@@ -12,7 +12,6 @@
 
 #include <vrpipe/arithmetic/exp2.h>
 
-#include <vrpipe/component/error.h>
 #include <vrpipe/pipeline/frame_facts.h>
 #include <vrpipe/pipeline/registry.h>
 
@@ -62,12 +61,6 @@ inline ChannelPairs merged_in_format(const ChannelPairs& front, const ChannelPai
   }
 }
 
-/// Of the bytes of attributes in single precision, 10 values: those that are left of 40 of them.
-std::uint32_t attribute_bytes_in(AttributeFormat format, std::uint32_t bytes) {
-  const std::uint32_t of_40 = format == AttributeFormat::fp32 ? 40 : format == AttributeFormat::fp16 ? 24 : 20;
-  return (bytes * of_40 + 39) / 40;
-}
-
 /// What a colour target of 16 bits can hold; NaN gives 0.
 float clamp_color(float value) { return std::min(std::max(0.0F, value), half_max); }
 
@@ -83,7 +76,8 @@ std::uint32_t threads_of(const Warp& warp, DrawIndex draw) {
 }  // namespace
 
 SplatShader::SplatShader(const Parameters& parameters, const RenderContext& context)
-    : context_(context),
+    : time_(parameters, context.precision),
+      context_(context),
       several_draws_gate_(context, "draw.several_draws"),
       mesh_gate_(context, "sm.mesh_shading"),
       color_reads_gate_(context, "sm.color_reads"),
@@ -99,42 +93,6 @@ SplatShader::SplatShader(const Parameters& parameters, const RenderContext& cont
   } else {
     choose_merging<NumberFormat::fp32>(precision.merging, precision.export_format);
   }
-  timing_.hand_over = {parameters.warp_launch_cycles.thousandths(), parameters.visit_launch_cycles.thousandths(),
-                       parameters.discard_launch_cycles.thousandths(), parameters.discard_warp_cycles.thousandths()};
-  timing_.cores = parameters.cores;
-  timing_.schedulers_per_core = parameters.schedulers_per_core;
-  timing_.lanes_per_scheduler = parameters.lanes_per_scheduler;
-  if (32 % timing_.lanes_per_scheduler != 0) {
-    throw UserError("unusable SM array", "sm.lanes_per_scheduler",
-                    "a warp of 32 threads does not issue in whole cycles on " +
-                        std::to_string(timing_.lanes_per_scheduler) + " lanes",
-                    "use 1, 2, 4, 8, 16 or 32");
-  }
-  timing_.warps_per_core = parameters.warps_per_core;
-  static_cast<void>(timing_.fragment_slots());  // refused at every fidelity, also where slots have no numbers
-  timing_.vertex_warps = parameters.vertex_warps;
-  timing_.warps_to_one_core = parameters.warps_to_one_core;
-  AttributeFetch& fetch = timing_.fetch;
-  fetch.attribute_bytes = attribute_bytes_in(precision.attributes, parameters.attribute_bytes);
-  fetch.core_bytes = parameters.memory_bytes_per_cycle;
-  fetch.buffer_bytes = parameters.attribute_buffer_bytes;
-  fetch.attribute_writes = parameters.attribute_writes;
-  fetch.l1_latency_cycles = parameters.l1_latency_cycles;
-  fetch.l1_mshrs = parameters.l1_mshrs;
-  fetch.l1.bytes = parameters.l1_bytes;
-  fetch.l1.ways = parameters.l1_ways;
-  fetch.check();
-  // The first instructions compute addresses and load; the rest waits for the attributes.
-  const auto program = [&](std::uint32_t instructions, std::uint32_t latency, std::uint32_t first = 4) {
-    const std::uint32_t loads = std::min(instructions, first);
-    return std::vector<ShaderSegment>{{loads, parameters.attribute_latency_cycles}, {instructions - loads, latency}};
-  };
-  timing_.vertex = program(parameters.vertex_instructions, parameters.fragment_latency_cycles);
-  timing_.fragment = program(parameters.fragment_instructions, parameters.fragment_latency_cycles);
-  timing_.mesh = program(parameters.mesh_instructions, parameters.fragment_latency_cycles);
-  // What follows the load is a compare and a discard.
-  timing_.alpha_threshold = program(parameters.alpha_threshold_instructions, 0, 3);
-  timing_.merge = {{parameters.merge_instructions, parameters.merge_latency_cycles}};
 }
 
 void SplatShader::set_up(Attributes& attributes, const Quad& quad) {

@@ -23,18 +23,17 @@ namespace vrpipe {
 /// no L1s, a warp asks for all that it reads. So does one that reads colour: what an L1 held of it would be stale.
 class SmMemory {
  public:
-  SmMemory(PortOwner& owner, const RenderContext& context, const SmBehaviour::TimingParameters& timing,
-           SectoredCacheStatistics& statistics)
-      : timing_(timing.fetch),
-        traffic_(context, timing.fetch),
+  SmMemory(PortOwner& owner, const RenderContext& context, const SmTime& time, SectoredCacheStatistics& statistics)
+      : timing_(time.fetch),
+        traffic_(context, time.fetch),
         port_(owner, "memory",
-              timing.vertex_warps * AttributeTraffic::most_vertex_reads + timing_.attribute_writes +
-                  timing.cores * timing_.l1_mshrs),
+              time.vertex_warps * AttributeTraffic::most_vertex_reads + timing_.attribute_writes +
+                  time.cores * timing_.l1_mshrs),
         statistics_(statistics),
-        reads_left_(timing.vertex_warps, 0),
-        writes_left_(timing.vertex_warps, 0),
-        fills_awaited_(timing.fragment_slots(), 0),
-        cores_(timing.cores) {}
+        reads_left_(time.vertex_warps, 0),
+        writes_left_(time.vertex_warps, 0),
+        fills_awaited_(time.fragment_slots(), 0),
+        cores_(time.cores) {}
 
   tlm::tlm_initiator_socket<32>& socket() { return port_.socket; }
   /// Before the first access.

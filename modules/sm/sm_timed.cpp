@@ -22,17 +22,17 @@ class TimedSm : public TimedUnit {
  public:
   TimedSm(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SmBehaviour> behaviour,
           const RenderContext& context)
-      : TimedUnit(name, domain, SmWork::kinds(behaviour->timing())),
+      : TimedUnit(name, domain, behaviour->time().kinds()),
         behaviour_(std::move(behaviour)),
-        timing_(behaviour_->timing()),
-        cycles_per_instruction_(timing_.cycles_per_instruction()),
-        roomy_(is_roomy(timing_, *context.frame)),
-        memory_(*this, context, timing_, l1_statistics_),
+        time_(behaviour_->time()),
+        cycles_per_instruction_(time_.cycles_per_instruction()),
+        roomy_(is_roomy(time_, *context.frame)),
+        memory_(*this, context, time_, l1_statistics_),
         fetch_gate_(context, "sm.attribute_fetch"),
-        vertex_(program(timing_.vertex, {}, true).front()),
+        vertex_(program(time_.vertex, {}, true).front()),
         fragment_(*context.frame,
                   [&](FragmentShader shader, bool merges) {
-                    return program(timing_.fragment_program(shader), merges ? timing_.merge : no_program, roomy_);
+                    return program(time_.fragment_program(shader), merges ? time_.merge : no_program, roomy_);
                   }),
         out_vertices_(*this, "out_vertices"),
         out_shaded_(*this, "out_shaded"),
@@ -44,20 +44,20 @@ class TimedSm : public TimedUnit {
                      [this](const VertexWarp& warp, CycleInterval visible) {
                        return shade_vertices(warp, visible.first);
                      }),
-        hand_over_(timing_, context),
-        scheduler_free_at_(std::size_t{timing_.cores} * timing_.schedulers_per_core, 0),
+        hand_over_(time_, context),
+        scheduler_free_at_(time_.schedulers(), 0),
         issues_(roomy_ ? 0 : scheduler_free_at_.size()),
-        free_of_core_(timing_.cores, timing_.warps_per_core),
-        vertex_slots_(timing_.vertex_warps, 0) {
+        free_of_core_(time_.cores, time_.warps_per_core),
+        vertex_slots_(time_.vertex_warps, 0) {
     fragment_.for_each([&](const Program& each) { waiting_.resize(std::max(waiting_.size(), each.size())); });
     if (!EffectGate(context, "cache.details").is_active()) l1_statistics_.leave_out_details();
-    free_slots_ = timing_.fragment_slots();
+    free_slots_ = time_.fragment_slots();
   }
 
   bool idle() const override { return next_event() == never; }
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket(); }
-  unsigned memory_bytes_per_cycle() const override { return timing_.cores * timing_.fetch.core_bytes; }
+  unsigned memory_bytes_per_cycle() const override { return time_.memory_bytes_per_cycle(); }
   bool memory_is_optional() const override { return true; }
   MemoryBytes memory_bytes() const override { return memory_.moved(); }
   void close_account(Cycle end) override {
@@ -75,7 +75,7 @@ class TimedSm : public TimedUnit {
     if (!fetches_) return;
     memory_.connect();
     // What memory says stands for the first stall.
-    vertex_.stall_cycles -= timing_.vertex.front().stall_cycles;
+    vertex_.stall_cycles -= time_.vertex.front().stall_cycles;
     fragment_.for_each([](Program& each) { each.front().stall_cycles -= each.front().fetch.stall_cycles; });
   }
 
@@ -108,19 +108,18 @@ class TimedSm : public TimedUnit {
   }
 
   /// Whether a warp can be launched in every cycle, and consecutive ones find schedulers that differ.
-  static bool is_roomy(const SmBehaviour::TimingParameters& timing, const Frame& frame) {
-    return has_room_for(FragmentShader::splat, timing) &&
+  static bool is_roomy(const SmTime& time, const Frame& frame) {
+    return has_room_for(FragmentShader::splat, time) &&
            std::all_of(frame.draws().begin(), frame.draws().end(),
-                       [&](const DrawCall& call) { return has_room_for(call.state.shader, timing); });
+                       [&](const DrawCall& call) { return has_room_for(call.state.shader, time); });
   }
-  static bool has_room_for(FragmentShader shader, const SmBehaviour::TimingParameters& timing) {
-    const Cycle cycles_per_instruction = timing.cycles_per_instruction();
-    const Segment fragment = program(timing.fragment_program(shader), {}, true).front();
-    const Segment merged = program(timing.fragment_program(shader), timing.merge, true).front();
-    return std::uint64_t{timing.cores} * timing.schedulers_per_core >= fragment.all() * cycles_per_instruction &&
-           timing.fragment_slots() >= 2 * (merged.all() * cycles_per_instruction + merged.stall_cycles) &&
-           timing.warps_to_one_core >= timing.schedulers_per_core &&
-           2 * timing.warps_to_one_core <= timing.warps_per_core;
+  static bool has_room_for(FragmentShader shader, const SmTime& time) {
+    const Cycle cycles_per_instruction = time.cycles_per_instruction();
+    const Segment fragment = program(time.fragment_program(shader), {}, true).front();
+    const Segment merged = program(time.fragment_program(shader), time.merge, true).front();
+    return time.schedulers() >= fragment.all() * cycles_per_instruction &&
+           time.fragment_slots() >= 2 * (merged.all() * cycles_per_instruction + merged.stall_cycles) &&
+           time.warps_to_one_core >= time.schedulers_per_core && 2 * time.warps_to_one_core <= time.warps_per_core;
   }
 
   bool has_slot() const { return has_slot_before(never); }
@@ -136,9 +135,9 @@ class TimedSm : public TimedUnit {
       ++free_slots_;
       active_.released(releases_.front().core, releases_.front().at);
     }
-    if (!(tile == last_tile_ && sent_to_core_ < timing_.warps_to_one_core && free_of_core_[core_] > 0)) {
+    if (!(tile == last_tile_ && sent_to_core_ < time_.warps_to_one_core && free_of_core_[core_] > 0)) {
       do {
-        core_ = core_ + 1 == timing_.cores ? 0 : core_ + 1;
+        core_ = core_ + 1 == time_.cores ? 0 : core_ + 1;
       } while (free_of_core_[core_] == 0);
       sent_to_core_ = 0;
     }
@@ -151,8 +150,8 @@ class TimedSm : public TimedUnit {
   }
 
   std::size_t next_scheduler() {
-    const std::size_t next = std::size_t{core_} * timing_.schedulers_per_core + turn_of_scheduler_;
-    turn_of_scheduler_ = turn_of_scheduler_ + 1 == timing_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
+    const std::size_t next = std::size_t{core_} * time_.schedulers_per_core + turn_of_scheduler_;
+    turn_of_scheduler_ = turn_of_scheduler_ + 1 == time_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
     return next;
   }
 
@@ -335,7 +334,7 @@ class TimedSm : public TimedUnit {
     }
     next_vertex_launch_ = launch + 1;
     vertex_slots_[vertex_turn_] = hand_on_vertices(warp, std::max(done, launch)) + 1;
-    vertex_turn_ = vertex_turn_ + 1 == timing_.vertex_warps ? 0 : vertex_turn_ + 1;
+    vertex_turn_ = vertex_turn_ + 1 == time_.vertex_warps ? 0 : vertex_turn_ + 1;
     return launch;
   }
 
@@ -355,11 +354,11 @@ class TimedSm : public TimedUnit {
   }
 
   std::unique_ptr<SmBehaviour> behaviour_;
-  const SmBehaviour::TimingParameters timing_;
+  const SmTime time_;
   const Cycle cycles_per_instruction_;
   const bool roomy_;
   SectoredCacheStatistics l1_statistics_{*this, "l1"};
-  ActiveCores active_{*this, timing_.cores};
+  ActiveCores active_{*this, time_.cores};
   TimedSmMemory memory_;
   std::unique_ptr<FixedLatencyMemory> no_memory_;
   bool fetches_ = false;      ///< the memory port is connected

@@ -91,34 +91,34 @@ class SmUnit : public Unit {
  public:
   SmUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SmBehaviour> behaviour,
          const RenderContext& context)
-      : Unit(name, domain, SmWork::kinds(behaviour->timing())),
+      : Unit(name, domain, behaviour->time().kinds()),
         in_vertices_(*this, "in_vertices"),
         out_vertices_(*this, "out_vertices"),
         in_warps_(*this, "in_warps"),
         out_shaded_(*this, "out_shaded"),
         in_release_(*this, "in_release"),
         behaviour_(std::move(behaviour)),
-        timing_(behaviour_->timing()),
-        cycles_per_instruction_(timing_.cycles_per_instruction()),
-        warps_per_core_(timing_.warps_per_core),
-        memory_(*this, context, timing_, l1_statistics_),
+        time_(behaviour_->time()),
+        cycles_per_instruction_(time_.cycles_per_instruction()),
+        warps_per_core_(time_.warps_per_core),
+        memory_(*this, context, time_, l1_statistics_),
         fetch_gate_(context, "sm.attribute_fetch"),
-        hand_over_(timing_, context),
-        vertex_{timing_.vertex, timing_.vertex.size()},
+        hand_over_(time_, context),
+        vertex_{time_.vertex, time_.vertex.size()},
         fragment_(*context.frame, [&](FragmentShader shader, bool merges) { return program(shader, merges); }),
         wheel_(horizon()),
-        schedulers_(std::size_t{timing_.cores} * timing_.schedulers_per_core) {
+        schedulers_(time_.schedulers()) {
     if (!EffectGate(context, "cache.details").is_active()) l1_statistics_.leave_out_details();
-    fragment_slots_ = timing_.fragment_slots();
+    fragment_slots_ = time_.fragment_slots();
     free_slots_ = fragment_slots_;
-    flights_.resize(fragment_slots_ + timing_.vertex_warps);
+    flights_.resize(fragment_slots_ + time_.vertex_warps);
     next_.resize(flights_.size() + schedulers_.size());
     warps_.resize(fragment_slots_);
-    vertices_.resize(timing_.vertex_warps);
-    free_of_core_.resize(timing_.cores);
-    for (std::uint32_t core = 0; core < timing_.cores; ++core) {
-      for (std::uint32_t slot = timing_.warps_per_core; slot-- > 0;) {
-        free_of_core_[core].push_back(core * timing_.warps_per_core + slot);
+    vertices_.resize(time_.vertex_warps);
+    free_of_core_.resize(time_.cores);
+    for (std::uint32_t core = 0; core < time_.cores; ++core) {
+      for (std::uint32_t slot = time_.warps_per_core; slot-- > 0;) {
+        free_of_core_[core].push_back(core * time_.warps_per_core + slot);
       }
     }
   }
@@ -128,7 +128,7 @@ class SmUnit : public Unit {
   }
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket(); }
-  unsigned memory_bytes_per_cycle() const override { return timing_.cores * timing_.fetch.core_bytes; }
+  unsigned memory_bytes_per_cycle() const override { return time_.memory_bytes_per_cycle(); }
   bool memory_is_optional() const override { return true; }
   MemoryBytes memory_bytes() const override { return memory_.moved(); }
   void close_account(Cycle end) override {
@@ -161,16 +161,15 @@ class SmUnit : public Unit {
     fragment_.for_each([](Program& program) { program.segments.front().stall_cycles = 0; });
   }
   Program program(FragmentShader shader, bool merges) const {
-    Program program{timing_.fragment_program(shader), 0};
+    Program program{time_.fragment_program(shader), 0};
     program.shading = program.segments.size();
-    if (merges) program.segments.insert(program.segments.end(), timing_.merge.begin(), timing_.merge.end());
+    if (merges) program.segments.insert(program.segments.end(), time_.merge.begin(), time_.merge.end());
     return program;
   }
 
   std::uint32_t horizon() const {
-    std::uint32_t longest = timing_.fetch.l1_latency_cycles + 1;
-    for (const auto* program :
-         {&timing_.vertex, &timing_.fragment, &timing_.mesh, &timing_.alpha_threshold, &timing_.merge}) {
+    std::uint32_t longest = time_.fetch.l1_latency_cycles + 1;
+    for (const auto* program : {&time_.vertex, &time_.fragment, &time_.mesh, &time_.alpha_threshold, &time_.merge}) {
       for (const ShaderSegment& segment : *program) {
         longest = std::max(longest, segment.instructions * cycles_per_instruction_ + segment.stall_cycles);
       }
@@ -311,15 +310,15 @@ class SmUnit : public Unit {
   // Vertex warps are few, so what they need is kept out of the way of the others.
   [[gnu::noinline]] void send_vertex_warp() {
     out_vertices_.push(vertices_[vertex_first_]);
-    vertex_first_ = vertex_first_ + 1 == timing_.vertex_warps ? 0 : vertex_first_ + 1;
+    vertex_first_ = vertex_first_ + 1 == time_.vertex_warps ? 0 : vertex_first_ + 1;
     --vertex_count_;
   }
 
   bool choose_core(TileId tile) {
-    if (tile == last_tile_ && sent_to_core_ < timing_.warps_to_one_core && !free_of_core_[core_].empty()) return true;
+    if (tile == last_tile_ && sent_to_core_ < time_.warps_to_one_core && !free_of_core_[core_].empty()) return true;
     if (free_slots_ == 0) return false;
     do {
-      core_ = core_ + 1 == timing_.cores ? 0 : core_ + 1;
+      core_ = core_ + 1 == time_.cores ? 0 : core_ + 1;
     } while (free_of_core_[core_].empty());
     sent_to_core_ = 0;
     return true;
@@ -357,8 +356,8 @@ class SmUnit : public Unit {
     Flight& flight = flights_[slot];
     flight.program = &fragment_.of(warp);
     flight.segment = 0;
-    flight.scheduler = static_cast<std::uint16_t>(core_ * timing_.schedulers_per_core + turn_of_scheduler_);
-    turn_of_scheduler_ = turn_of_scheduler_ + 1 == timing_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
+    flight.scheduler = static_cast<std::uint16_t>(core_ * time_.schedulers_per_core + turn_of_scheduler_);
+    turn_of_scheduler_ = turn_of_scheduler_ + 1 == time_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
     warps_[slot] = warp;
     if (hand_over_.is_on()) pay_for_launch(warp, now);
     in_warps_.pop();
@@ -378,13 +377,13 @@ class SmUnit : public Unit {
   [[gnu::noinline]] bool look_up(std::uint32_t slot, const Warp& warp, Cycle now) {
     if (!looks_up_) memory_.begin_look_up(slot, core_, warp);
     looks_up_ = !memory_.look_up(now);
-    there_[slot] = timing_.fetch.has_l1() ? now + timing_.fetch.l1_latency_cycles : now;
+    there_[slot] = time_.fetch.has_l1() ? now + time_.fetch.l1_latency_cycles : now;
     return !looks_up_;
   }
 
   [[gnu::noinline]] void launch_vertex_warp(Cycle now) {
     std::uint32_t turn = vertex_first_ + vertex_count_++;
-    if (turn >= timing_.vertex_warps) turn -= timing_.vertex_warps;
+    if (turn >= time_.vertex_warps) turn -= time_.vertex_warps;
     const std::uint32_t slot = fragment_slots_ + turn;
     vertices_[turn] = in_vertices_.front();
     in_vertices_.pop();
@@ -404,7 +403,7 @@ class SmUnit : public Unit {
     release_slots(now);
     run_events(now);
     launch_fragments(now);
-    if (in_vertices_.ready() && vertex_count_ < timing_.vertex_warps) launch_vertex_warp(now);
+    if (in_vertices_.ready() && vertex_count_ < time_.vertex_warps) launch_vertex_warp(now);
     if (fetches_) memory_.send([this](std::uint32_t turn) { flights_[fragment_slots_ + turn].done = true; });
     send();
 
@@ -428,7 +427,7 @@ class SmUnit : public Unit {
     if (!slots_full_ && !(looks_up_ && in_warps_.ready())) {
       next = std::min(next, std::max(in_warps_.next_ready(), hand_over_.free_from(now + 1)));
     }
-    if (vertex_count_ < timing_.vertex_warps) next = std::min(next, std::max(in_vertices_.next_ready(), now + 1));
+    if (vertex_count_ < time_.vertex_warps) next = std::min(next, std::max(in_vertices_.next_ready(), now + 1));
     return std::min(next, in_release_.next_ready());
   }
 
@@ -438,11 +437,11 @@ class SmUnit : public Unit {
   StreamOut<ShadedWarpItem> out_shaded_;
   StreamIn<WarpRelease> in_release_;
   std::unique_ptr<SmBehaviour> behaviour_;
-  const SmBehaviour::TimingParameters timing_;
+  const SmTime time_;
   const std::uint32_t cycles_per_instruction_;
   const Divisor warps_per_core_;
   SectoredCacheStatistics l1_statistics_{*this, "l1"};
-  ActiveCores active_{*this, timing_.cores};
+  ActiveCores active_{*this, time_.cores};
   SmMemory memory_;
   std::unique_ptr<FixedLatencyMemory> no_memory_;
   bool fetches_ = false;      ///< the memory port is connected

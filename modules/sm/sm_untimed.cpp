@@ -14,18 +14,18 @@ namespace {
 class UntimedSm : public UntimedUnit {
  public:
   UntimedSm(const std::string& name, std::unique_ptr<SmBehaviour> behaviour, const RenderContext& context)
-      : UntimedUnit(name, work(behaviour->timing())),
+      : UntimedUnit(name, work(behaviour->time())),
         out_vertices_(*this, "out_vertices"),
         out_shaded_(*this, "out_shaded"),
         in_release_(input<WarpRelease>("in_release", [](const WarpRelease&) {})),
         in_warps_(input<Warp>("in_warps", [this](const Warp& warp) { shade(warp); })),
         in_vertices_(input<VertexWarp>("in_vertices", [this](const VertexWarp& warp) { shade_vertices(warp); })),
         behaviour_(std::move(behaviour)),
-        timing_(behaviour_->timing()),
-        traffic_(context, timing_.fetch),
+        time_(behaviour_->time()),
+        traffic_(context, time_.fetch),
         memory_(traffic_.origin(MemoryTraffic::attribute)),
         fetch_gate_(context, "sm.attribute_fetch"),
-        hand_over_(timing_, context),
+        hand_over_(time_, context),
         tiling_(context.frame->width(), context.frame->height()),
         visits_(hand_over_.is_on() && context.termination == Termination::paper ? tiling_.tiles() : 0) {
     if (!EffectGate(context, "cache.details").is_active()) l1_statistics_.leave_out_details();
@@ -46,14 +46,14 @@ class UntimedSm : public UntimedUnit {
     const HandOver::Price left = hand_over_.most_left();
     return hand_over_.is_on() ? static_cast<double>(std::max(left.warp, left.visits)) / 1000 : 0;
   }
-  std::uint64_t room_in_warps() const override { return std::uint64_t{timing_.cores} * timing_.warps_per_core; }
+  std::uint64_t room_in_warps() const override { return std::uint64_t{time_.cores} * time_.warps_per_core; }
 
  private:
   /// Vertices and merging are counted in warps, fragments in instructions.
-  static std::vector<WorkKind> work(const SmBehaviour::TimingParameters& timing) {
-    std::vector<WorkKind> kinds = SmWork::kinds(timing);
-    kinds[SmWork::vertex].cycles_per_item *= static_cast<double>(instructions_in(timing.vertex));
-    kinds[SmWork::merge].cycles_per_item *= static_cast<double>(instructions_in(timing.merge));
+  static std::vector<WorkKind> work(const SmTime& time) {
+    std::vector<WorkKind> kinds = time.kinds();
+    kinds[SmWork::vertex].cycles_per_item *= static_cast<double>(instructions_in(time.vertex));
+    kinds[SmWork::merge].cycles_per_item *= static_cast<double>(instructions_in(time.merge));
     return kinds;
   }
   void shade(const Warp& warp) {
@@ -93,15 +93,15 @@ class UntimedSm : public UntimedUnit {
   bool follows_memory() { return memory_.connected() && fetch_gate_.enter(); }
   [[gnu::noinline]] void read(const Warp& warp) {
     traffic_.find_reads(warp, reads_);
-    if (!timing_.fetch.has_l1() || reads_.traffic != MemoryTraffic::attribute) {
+    if (!time_.fetch.has_l1() || reads_.traffic != MemoryTraffic::attribute) {
       for (unsigned i = 0; i < reads_.count; ++i) ask(reads_.lines[i].address, reads_.lines[i].sectors);
       return;
     }
     if (l1s_.empty()) {
-      for (std::uint32_t core = 0; core < timing_.cores; ++core) l1s_.emplace_back(timing_.fetch.l1, l1_statistics_);
+      for (std::uint32_t core = 0; core < time_.cores; ++core) l1s_.emplace_back(time_.fetch.l1, l1_statistics_);
     }
-    if (warp.tile != last_tile_ || sent_to_core_ == timing_.warps_to_one_core) {
-      core_ = core_ + 1 == timing_.cores ? 0 : core_ + 1;
+    if (warp.tile != last_tile_ || sent_to_core_ == time_.warps_to_one_core) {
+      core_ = core_ + 1 == time_.cores ? 0 : core_ + 1;
       sent_to_core_ = 0;
     }
     last_tile_ = warp.tile;
@@ -132,7 +132,7 @@ class UntimedSm : public UntimedUnit {
   std::unique_ptr<UntimedIn<Warp>> in_warps_;
   std::unique_ptr<UntimedIn<VertexWarp>> in_vertices_;
   std::unique_ptr<SmBehaviour> behaviour_;
-  const SmBehaviour::TimingParameters timing_;
+  const SmTime time_;
   const AttributeTraffic traffic_;
   UntimedMemoryPort memory_;
   EffectGate fetch_gate_;

@@ -18,13 +18,12 @@ namespace vrpipe {
 /// in their order.
 class TimedSmMemory {
  public:
-  TimedSmMemory(PortOwner& owner, const RenderContext& context, const SmBehaviour::TimingParameters& timing,
-                SectoredCacheStatistics& statistics)
-      : timing_(timing.fetch),
-        traffic_(context, timing.fetch),
+  TimedSmMemory(PortOwner& owner, const RenderContext& context, const SmTime& time, SectoredCacheStatistics& statistics)
+      : timing_(time.fetch),
+        traffic_(context, time.fetch),
         port_(owner, "memory"),
         statistics_(statistics),
-        cores_(timing.cores),
+        cores_(time.cores),
         answered_(timing_.attribute_writes, 0),
         sends_at_once_(context.placement.gpcs > 1) {}
 

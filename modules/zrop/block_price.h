@@ -14,6 +14,8 @@ class BlockPrice {
   /// In thousandths of a cycle; all 0: there is no such price.
   BlockPrice(std::uint32_t half, std::uint32_t block) : half_(half), block_(std::max(half, block)) {}
   bool is_on() const { return block_ > 0; }
+  /// The most that so many quads take.
+  std::uint64_t most_of(unsigned quads) const { return std::uint64_t{quads} * block_; }
   /// Where a primitive's quads were.
   struct Place {
     TileId tile;

@@ -7,6 +7,7 @@
 
 #include "beat_lines.h"
 #include "z_cache_statistics.h"
+#include "zrop_time.h"
 
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/memory/line_visits.h>
@@ -21,18 +22,18 @@ namespace vrpipe {
 class TimedZCache {
  public:
   /// @param out_reads  what they take of the ROPs' port
-  TimedZCache(TimedUnit& owner, TimedOut<PortReads>& out_reads, const ZropBehaviour::TimingParameters& timing,
-              const Placement& placement, ZCacheStatistics& statistics)
-      : timing_(timing.z_cache),
+  TimedZCache(TimedUnit& owner, TimedOut<PortReads>& out_reads, const ZropTime& time, const Placement& placement,
+              ZCacheStatistics& statistics)
+      : timing_(time.z_cache),
         out_reads_(out_reads),
         sectors_of_a_line_(timing_.organization.sectors_of_a_line()),
         statistics_(statistics),
         port_(owner, "memory", timing_.mshrs, std::min(sectors_of_a_line_, timing_.mshrs),
               timing_.organization.sector_bytes, statistics,
               {MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(placement.gpc)}),
-        early_(timing.quads_per_cycle, std::max(timing_.input_quads, QuadBeat::capacity)),
-        late_(timing.quads_per_cycle, std::max(timing_.input_quads, quads_per_warp)),
-        updates_(timing.updates_per_cycle),
+        early_(time.quads_per_cycle, std::max(timing_.input_quads, QuadBeat::capacity)),
+        late_(time.quads_per_cycle, std::max(timing_.input_quads, quads_per_warp)),
+        updates_(time.updates_per_cycle),
         queued_updates_(timing_.input_updates),
         pins_lines_(TimedPins::are_needed(timing_.organization.replacement) && !timing_.fetches_ahead()),
         lines_ahead_(std::max(timing_.fetch_ahead_lines, std::uint32_t{QuadBeat::capacity})) {}

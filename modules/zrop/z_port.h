@@ -9,6 +9,7 @@
 #include "late_look_ups.h"
 #include "z_cache_statistics.h"
 #include "z_lines_ahead.h"
+#include "zrop_time.h"
 
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/kernel/ring.h>
@@ -29,18 +30,18 @@ namespace vrpipe {
 class ZPort {
  public:
   /// @param out_reads  what they take of the ROPs' port
-  ZPort(PortOwner& owner, StreamOut<PortReads>& out_reads, const ZCache& timing, unsigned quads_per_cycle,
-        unsigned updates_per_cycle, const RenderContext& context, const LatePlan& plan)
+  ZPort(PortOwner& owner, StreamOut<PortReads>& out_reads, const ZropTime& time, const RenderContext& context,
+        const LatePlan& plan)
       : context_(context),
         plan_(plan),
-        timing_(timing),
+        timing_(time.z_cache),
         out_reads_(out_reads),
-        updates_per_cycle_(updates_per_cycle),
-        port_(owner, "memory", timing.mshrs,
+        updates_per_cycle_(time.updates_per_cycle),
+        port_(owner, "memory", timing_.mshrs,
               {MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(context.placement.gpc)},
-              timing.organization.sectors_of_a_line()),
-        look_ups_(quads_per_cycle),
-        late_(quads_per_cycle, timing.input_quads) {}
+              timing_.organization.sectors_of_a_line()),
+        look_ups_(time.quads_per_cycle),
+        late_(time.quads_per_cycle, timing_.input_quads) {}
 
   tlm::tlm_initiator_socket<32>& socket() { return port_.socket(); }
   const MemoryBytes& moved() const { return port_.moved(); }

@@ -14,18 +14,10 @@ namespace vrpipe {
 
 DepthStencilRop::DepthStencilRop(const Parameters& parameters, const RenderContext& context)
     : context_(context),
-      timing_{parameters.quads_per_cycle,
-              parameters.latency_cycles,
-              parameters.updates_per_cycle,
-              {parameters.cache.organization(), parameters.mshrs, parameters.input_quads, parameters.input_updates,
-               parameters.sectors_per_cycle, parameters.fast_clear, parameters.fetch_ahead_lines},
-              parameters.half_block_cycles.thousandths(),
-              parameters.block_cycles.thousandths()},
+      time_(parameters, context.frame->depth_format()),
       depth_stencil_(context),
       depth_stencil_gate_(context, "zrop.depth_stencil"),
-      termination_gate_(context, "zrop.termination") {
-  timing_.z_cache.check(context.frame->depth_format());
-}
+      termination_gate_(context, "zrop.termination") {}
 
 namespace {
 

@@ -3,7 +3,6 @@
 #include <optional>
 #include <vector>
 
-#include "zrop/block_price.h"
 #include "zrop/block_time.h"
 #include "zrop/hi_z_reports.h"
 #include "zrop/late_quads.h"
@@ -28,7 +27,7 @@ class TimedZrop : public TimedUnit {
  public:
   TimedZrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour,
             const RenderContext& context)
-      : TimedUnit(name, domain, ZropWork::kinds(behaviour->timing())),
+      : TimedUnit(name, domain, behaviour->time().kinds()),
         context_(context),
         plan_(context),
         out_(*this, "out_quads"),
@@ -43,21 +42,22 @@ class TimedZrop : public TimedUnit {
                  [this](const ShadedWarpItem& item, CycleInterval visible) { return test_late(item, visible.first); }),
         in_(*this, "in_quads", [this](const BinItem& item, CycleInterval visible) { return test(item, visible); }),
         behaviour_(std::move(behaviour)),
-        timing_(behaviour_->timing()),
-        at_once_(std::min(timing_.quads_per_cycle, QuadBeat::capacity)),
-        tests_(timing_.quads_per_cycle),
-        late_tests_(timing_.quads_per_cycle),
-        updates_(timing_.updates_per_cycle),
-        z_(*this, out_reads_, timing_, context.placement, cache_statistics_),
+        time_(behaviour_->time()),
+        at_once_(std::min(time_.quads_per_cycle, QuadBeat::capacity)),
+        tests_(time_.quads_per_cycle),
+        late_tests_(time_.quads_per_cycle),
+        updates_(time_.updates_per_cycle),
+        z_(*this, out_reads_, time_, context.placement, cache_statistics_),
         z_cache_gate_(context, "zrop.z_cache"),
-        blocks_(timing_.half_block_thousandths, timing_.block_thousandths),
-        block_time_(timing_.quads_per_cycle),
+        blocks_(time_.blocks),
+        block_time_(time_.quads_per_cycle,
+                    [this](std::uint64_t work, Cycle from, Cycle until) { did(ZropWork::blocks, work, from, until); }),
         hi_z_(context) {
-    out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
-    out_hi_z_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
+    out_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
+    out_hi_z_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
     if (!EffectGate(context, "cache.details").is_active()) cache_statistics_.leave_out_details();
     out_hi_z_.set_optional();
-    out_late_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
+    out_late_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
     out_late_.set_optional();
     in_late_.set_optional();
     out_reads_.set_optional();
@@ -72,7 +72,7 @@ class TimedZrop : public TimedUnit {
     if (has_cache_) look_up_updates(never);
     while (!pending_.empty()) apply_update();
     make_way(never);
-    settle_blocks(never);
+    block_time_.settle(never);
     TimedUnit::close_account(end);
   }
 
@@ -178,7 +178,7 @@ class TimedZrop : public TimedUnit {
       const Cycle at = take(ready, beat.count);
       if (has_cache_) z_.tested(beat.count, needs_stencil, at);
       const unsigned tested_quads = beat.count;
-      port_free_at_ = at + (tested_quads + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
+      port_free_at_ = time_.end_of_tests(at, tested_quads);
       if (blocks_.is_on())
         pay_for_blocks(price * (from + tested_quads) / total - price * from / total, tested_quads, at);
       did(ZropWork::tests, tested_quads, at, port_free_at_);
@@ -190,7 +190,7 @@ class TimedZrop : public TimedUnit {
         note_moves();
       }
       if (hi_z && changed != 0) tell(before, changed, at);
-      if (beat.count < tested_quads) end_quads(before, tested_quads, at + timing_.latency_cycles);
+      if (beat.count < tested_quads) end_quads(before, tested_quads, at + time_.latency_cycles);
       tested.first = std::min(tested.first, at);
       tested.last = at;
       // A part without survivors goes no further, but for the mark that closes the bin.
@@ -217,7 +217,7 @@ class TimedZrop : public TimedUnit {
   /// Quads of a bin that are looked up and tested together: of one primitive where tags are looked at twice.
   unsigned end_of_part(const std::vector<Quad>& quads, unsigned from, unsigned total) const {
     const unsigned most = std::min(total, from + at_once_);
-    if (!has_cache_ || !timing_.z_cache.fetches_ahead()) return most;
+    if (!has_cache_ || !time_.z_cache.fetches_ahead()) return most;
     unsigned end = from + 1;
     while (end < most && primitive_order(quads[end]) == primitive_order(quads[from])) ++end;
     return end;
@@ -234,18 +234,7 @@ class TimedZrop : public TimedUnit {
   [[gnu::noinline]] void pay_for_blocks(std::uint64_t price, unsigned quads, Cycle at) {
     port_free_at_ = std::max(port_free_at_, block_port_.take(at, price));
     tests_.hold(block_port_.free_from(0));
-    settle_blocks(at);
-    block_time_.pay(at, price);
-    block_time_.test(at, quads);
-  }
-  void settle_blocks(Cycle now) {
-    block_time_.settle(now, [this](std::uint64_t thousandths, Cycle from, Cycle until) {
-      did(ZropWork::blocks, thousandths, from, until);
-    });
-  }
-  [[gnu::noinline]] void take_cycle_of_blocks(Cycle at) {
-    settle_blocks(at);
-    block_time_.take_cycle(at);
+    block_time_.test(at, quads, price);
   }
 
   void pass(Mark mark, Cycle at) {
@@ -293,7 +282,7 @@ class TimedZrop : public TimedUnit {
       note_moves();
     }
     if (changed != 0 && hi_z_.wanted(before.quads[0].draw)) tell(before, changed, at);
-    if (warp.count < before.count) end_quads(before, before.count, at + timing_.latency_cycles);
+    if (warp.count < before.count) end_quads(before, before.count, at + time_.latency_cycles);
     const Cycle taken = out_late_.send(item, at).first;
     late_tests_.hold(taken);
     return has_cache_ ? times.at : std::max(at, taken);
@@ -303,12 +292,9 @@ class TimedZrop : public TimedUnit {
     for (; !late_.empty() && late_.front().at <= std::max(test, tests_.next_free()); late_.pop()) {
       const unsigned quads = late_.front().quads;
       const Cycle at = tests_.take(late_.front().at, quads);
-      const Cycle until = at + (quads + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
+      const Cycle until = time_.end_of_tests(at, quads);
       did(ZropWork::late_tests, quads, at, until);
-      if (blocks_.is_on()) {
-        settle_blocks(at);
-        block_time_.test(at, quads);
-      }
+      if (blocks_.is_on()) block_time_.test(at, quads, 0);
       port_free_at_ = std::max(port_free_at_, until);
     }
   }
@@ -347,8 +333,8 @@ class TimedZrop : public TimedUnit {
     for (; !moves_.empty() && moves_.front() <= std::max(test, tests_.next_free()); moves_.pop()) {
       const Cycle at = tests_.take_cycle(moves_.front());
       port_free_at_ = at + 1;
-      did(ZropWork::sectors, timing_.z_cache.sectors_per_cycle, at);
-      if (blocks_.is_on()) take_cycle_of_blocks(at);
+      did(ZropWork::sectors, time_.z_cache.sectors_per_cycle, at);
+      if (blocks_.is_on()) block_time_.take_cycle(at);
     }
   }
 
@@ -357,7 +343,7 @@ class TimedZrop : public TimedUnit {
     const Cycle at = pending_.front().at;
     if (at >= port_free_at_) {
       did(ZropWork::updates, 1, at);
-      if (blocks_.is_on()) take_cycle_of_blocks(at);
+      if (blocks_.is_on()) block_time_.take_cycle(at);
       port_free_at_ = at + 1;
     }
     behaviour_->update(pending_.front().signal);
@@ -374,7 +360,7 @@ class TimedZrop : public TimedUnit {
   TimedIn<ShadedWarpItem> in_late_;
   TimedIn<BinItem> in_;
   std::unique_ptr<ZropBehaviour> behaviour_;
-  const ZropBehaviour::TimingParameters timing_;
+  const ZropTime time_;
   const unsigned at_once_;
   IssuePort tests_;
   IssuePort late_tests_;

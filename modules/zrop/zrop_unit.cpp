@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <memory>
 
-#include "zrop/block_price.h"
 #include "zrop/block_time.h"
 #include "zrop/hi_z_reports.h"
 #include "zrop/late_quads.h"
@@ -22,7 +21,7 @@ class ZropUnit : public Unit {
  public:
   ZropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour,
            const RenderContext& context)
-      : Unit(name, domain, ZropWork::kinds(behaviour->timing())),
+      : Unit(name, domain, behaviour->time().kinds()),
         in_(*this, "in_quads"),
         out_(*this, "out_quads"),
         out_hi_z_(*this, "out_hi_z"),
@@ -34,18 +33,19 @@ class ZropUnit : public Unit {
         plan_(context),
         tests_late_(plan_.is_used()),
         behaviour_(std::move(behaviour)),
-        timing_(behaviour_->timing()),
-        z_(*this, out_reads_, timing_.z_cache, timing_.quads_per_cycle, timing_.updates_per_cycle, context, plan_),
+        time_(behaviour_->time()),
+        z_(*this, out_reads_, time_, context, plan_),
         z_cache_gate_(context, "zrop.z_cache"),
-        limit_(timing_.quads_per_cycle),
-        blocks_(timing_.half_block_thousandths, timing_.block_thousandths),
-        block_time_(timing_.quads_per_cycle),
+        limit_(time_.quads_per_cycle),
+        blocks_(time_.blocks),
+        block_time_(time_.quads_per_cycle,
+                    [this](std::uint64_t work, Cycle from, Cycle until) { did(ZropWork::blocks, work, from, until); }),
         hi_z_(context) {
-    out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
-    out_hi_z_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
+    out_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
+    out_hi_z_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
     if (!EffectGate(context, "cache.details").is_active()) cache_statistics_.leave_out_details();
     out_hi_z_.set_optional();
-    out_late_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
+    out_late_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
     out_late_.set_optional();
     in_late_.set_optional();
     out_reads_.set_pipeline(0, 2 * QuadBeat::capacity);
@@ -60,7 +60,7 @@ class ZropUnit : public Unit {
   bool memory_is_optional() const override { return true; }
   MemoryBytes memory_bytes() const override { return z_.moved(); }
   void close_account(Cycle end) override {
-    settle_blocks(never);
+    block_time_.settle(never);
     Unit::close_account(end);
   }
 
@@ -76,7 +76,7 @@ class ZropUnit : public Unit {
   }
 
   bool update(Cycle now) {
-    unsigned budget = timing_.updates_per_cycle;
+    unsigned budget = time_.updates_per_cycle;
     bool moved = false;
     while (budget > 0 && in_terminations_.ready()) {
       const TerminationBeat& beat = in_terminations_.front();
@@ -95,7 +95,7 @@ class ZropUnit : public Unit {
     // Beside a beat that takes several cycles an update takes nothing of its own.
     if (moved && now >= tested_until_) {
       did(ZropWork::updates, 1, now);
-      if (blocks_.is_on()) take_cycle_of_blocks(now);
+      if (blocks_.is_on()) block_time_.take_cycle(now);
     }
     return moved;
   }
@@ -103,7 +103,7 @@ class ZropUnit : public Unit {
   /// Those that were looked up.
   bool apply_updates(Cycle now) {
     bool moved = false;
-    for (unsigned budget = timing_.updates_per_cycle; budget > 0 && z_.update_is_there(); --budget) {
+    for (unsigned budget = time_.updates_per_cycle; budget > 0 && z_.update_is_there(); --budget) {
       behaviour_->update(z_.front_update());
       z_.pop_update();
       moved = true;
@@ -112,11 +112,11 @@ class ZropUnit : public Unit {
   }
 
   bool move_sectors(Cycle now) {
-    const unsigned sectors = timing_.z_cache.sectors_per_cycle;
+    const unsigned sectors = time_.z_cache.sectors_per_cycle;
     if (z_.owed_sectors() < sectors || now < free_at_) return false;
     z_.pay_sectors(sectors);
     did(ZropWork::sectors, sectors, now);
-    if (blocks_.is_on()) take_cycle_of_blocks(now);
+    if (blocks_.is_on()) block_time_.take_cycle(now);
     return true;
   }
 
@@ -128,7 +128,7 @@ class ZropUnit : public Unit {
       if (!limit_.allows(width, now) || !block_port_.is_free(now)) break;
       QuadBeat beat = next;
       has_cache_ ? z_.pop() : in_.pop();
-      tested_until_ = now + (width + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
+      tested_until_ = time_.end_of_tests(now, width);
       if (blocks_.is_on()) pay_for_blocks(beat, now);
       did(ZropWork::tests, beat.count, now, tested_until_);
       const unsigned tested = beat.count;
@@ -148,7 +148,7 @@ class ZropUnit : public Unit {
       } else {
         pass(beat.mark);
       }
-      if (beat.count < tested) end_quads(before, tested, now + timing_.latency_cycles);
+      if (beat.count < tested) end_quads(before, tested, now + time_.latency_cycles);
       moved = true;
       // A beat without survivors goes no further, but for the mark that closes a bin.
       if (beat.count > 0 || beat.last_of_bin || beat.mark != Mark::none) out_.push(beat);
@@ -164,18 +164,7 @@ class ZropUnit : public Unit {
   [[gnu::noinline]] void pay_for_blocks(const QuadBeat& beat, Cycle now) {
     const std::uint64_t price = blocks_.of(beat.tile, beat.quads.data(), beat.count);
     tested_until_ = std::max(tested_until_, block_port_.take(now, price));
-    settle_blocks(now);
-    block_time_.pay(now, price);
-    block_time_.test(now, beat.count);
-  }
-  void settle_blocks(Cycle now) {
-    block_time_.settle(now, [this](std::uint64_t thousandths, Cycle from, Cycle until) {
-      did(ZropWork::blocks, thousandths, from, until);
-    });
-  }
-  [[gnu::noinline]] void take_cycle_of_blocks(Cycle now) {
-    settle_blocks(now);
-    block_time_.take_cycle(now);
+    block_time_.test(now, beat.count, price);
   }
 
   bool test_all(Cycle now) {
@@ -190,7 +179,7 @@ class ZropUnit : public Unit {
       if (!limit_.allows(width, now)) break;
       has_cache_ ? z_.pop_late() : in_late_.pop();
       limit_.take(width);
-      tested_until_ = now + (width + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
+      tested_until_ = time_.end_of_tests(now, width);
       if (item.warp->mark == Mark::none) {
         test_late(item.warp->editable(), now);
       } else {
@@ -208,13 +197,10 @@ class ZropUnit : public Unit {
     const QuadBeat before = quads_of(warp);
     const std::uint32_t changed = behaviour_->test_late(warp);
     did(ZropWork::late_tests, before.count, now, tested_until_);
-    if (blocks_.is_on()) {
-      settle_blocks(now);
-      block_time_.test(now, before.count);
-    }
+    if (blocks_.is_on()) block_time_.test(now, before.count, 0);
     if (has_cache_ && changed != 0) z_.change(before, changed);
     if (changed != 0 && hi_z_.wanted(before.quads[0].draw)) tell_later(before, changed);
-    if (warp.count < before.count) end_quads(before, before.count, now + timing_.latency_cycles);
+    if (warp.count < before.count) end_quads(before, before.count, now + time_.latency_cycles);
   }
 
   void pass(Mark mark) {
@@ -273,7 +259,7 @@ class ZropUnit : public Unit {
           : z_.late_is_there() || (z_.beat_is_there() && !waits_) ? UnitState::blocked
                                                                   : UnitState::memory,
           now);
-    if (looked_up || worked || z_.owed_sectors() >= timing_.z_cache.sectors_per_cycle) return now + 1;
+    if (looked_up || worked || z_.owed_sectors() >= time_.z_cache.sectors_per_cycle) return now + 1;
     const Cycle next = z_.next(now, in_, in_terminations_, in_late_);
     return now < free_at_ ? std::min(next, free_at_) : next;
   }
@@ -289,7 +275,7 @@ class ZropUnit : public Unit {
   const LatePlan plan_;
   const bool tests_late_;  ///< any draw
   std::unique_ptr<ZropBehaviour> behaviour_;
-  const ZropBehaviour::TimingParameters timing_;
+  const ZropTime time_;
   ZPort z_;
   bool has_cache_ = false;
   bool lacks_cache_ = false;  ///< memory is connected, and the cache was left out

@@ -3,10 +3,10 @@
 #include <vector>
 
 #include "zrop/beat_lines.h"
-#include "zrop/block_price.h"
 #include "zrop/hi_z_reports.h"
 #include "zrop/late_quads.h"
 #include "zrop/z_cache_statistics.h"
+#include "zrop/zrop_time.h"
 
 #include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/model/untimed.h>
@@ -22,7 +22,7 @@ namespace {
 class UntimedZrop : public UntimedUnit {
  public:
   UntimedZrop(const std::string& name, std::unique_ptr<ZropBehaviour> behaviour, const RenderContext& context)
-      : UntimedUnit(name),
+      : UntimedUnit(name, behaviour->time().kinds()),
         context_(context),
         out_(*this, "out_quads"),
         out_hi_z_(*this, "out_hi_z"),
@@ -35,11 +35,10 @@ class UntimedZrop : public UntimedUnit {
                                                   for (unsigned i = 0; i < beat.count; ++i) update(beat.signals[i]);
                                                 })),
         behaviour_(std::move(behaviour)),
-        z_cache_(behaviour_->timing().z_cache),
+        time_(behaviour_->time()),
         memory_({MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(context.placement.gpc)}),
         z_cache_gate_(context, "zrop.z_cache"),
-        quads_per_cycle_(behaviour_->timing().quads_per_cycle),
-        blocks_(behaviour_->timing().half_block_thousandths, behaviour_->timing().block_thousandths),
+        blocks_(time_.blocks),
         tiling_(context.frame->width(), context.frame->height()),
         places_(blocks_.is_on() && context.termination == Termination::paper ? tiling_.tiles() : 1),
         hi_z_(context) {
@@ -52,6 +51,15 @@ class UntimedZrop : public UntimedUnit {
 
   Behaviour& behaviour() override { return *behaviour_; }
   UntimedMemoryPort* memory_port() override { return &memory_; }
+  BoundTerms terms() const override { return {false, false, 0, time_.updates_hide()}; }
+  std::vector<OccupancyPart> least_parts(const Items& items, bool to_last) const override {
+    return time_.least_parts(items, to_last);
+  }
+  double idle_after_last() const override { return static_cast<double>(time_.longest_beat()) / 1000; }
+  void leave_out_pending(Items& items) const override {
+    items[ZropWork::sectors] = time_.sectors_not_ahead(items[ZropWork::sectors]);
+    items[ZropWork::bytes_moved] = items[ZropWork::sectors] * time_.z_cache.organization.sector_bytes;
+  }
 
  private:
   void update(const TerminationSignal& signal) {
@@ -68,7 +76,8 @@ class UntimedZrop : public UntimedUnit {
   [[gnu::noinline]] void count_blocks() {
     BlockPrice::Place& last = places_.size() == 1 ? places_[0] : places_[tiling_.index(beat_.tile)];
     const std::uint64_t price = blocks_.of(beat_.tile, beat_.quads.data(), beat_.count, last);
-    const std::uint64_t of_quads = (std::uint64_t{1000} * beat_.count + quads_per_cycle_ - 1) / quads_per_cycle_;
+    const std::uint64_t of_quads =
+        (std::uint64_t{1000} * beat_.count + time_.quads_per_cycle - 1) / time_.quads_per_cycle;
     unshared_ += static_cast<std::int64_t>(price) - static_cast<std::int64_t>(of_quads);
     if (unshared_ <= 0) return;
     did(ZropWork::blocks, static_cast<std::uint64_t>(unshared_));
@@ -146,9 +155,9 @@ class UntimedZrop : public UntimedUnit {
   bool follows_cache() { return memory_.connected() && z_cache_gate_.enter(); }
   const BeatLines& lines() {
     if (!lines_) {
-      lines_.emplace(z_cache_, *behaviour_->surface());
-      cache_.emplace(z_cache_.organization, cache_statistics_);
-      cleared_ = cleared_sectors_of(*behaviour_->surface(), z_cache_, cache_statistics_);
+      lines_.emplace(time_.z_cache, *behaviour_->surface());
+      cache_.emplace(time_.z_cache.organization, cache_statistics_);
+      cleared_ = cleared_sectors_of(*behaviour_->surface(), time_.z_cache, cache_statistics_);
     }
     return *lines_;
   }
@@ -166,7 +175,7 @@ class UntimedZrop : public UntimedUnit {
         if (access.written_back != 0) cleared_->written(access.old_address, access.written_back);
       }
       line_ = access.line;
-      memory_.move(access, z_cache_.organization);
+      memory_.move(access, time_.z_cache.organization);
     }
     cache_->accessed(accesses, accesses);
     // Cleared sectors are not read for the first time; and what takes flits takes no time of the tests.
@@ -181,7 +190,7 @@ class UntimedZrop : public UntimedUnit {
   std::unique_ptr<UntimedIn<BinItem>> in_;
   std::unique_ptr<UntimedIn<TerminationBeat>> in_terminations_;
   std::unique_ptr<ZropBehaviour> behaviour_;
-  const ZCache z_cache_;
+  const ZropTime time_;
   UntimedMemoryPort memory_;
   EffectGate z_cache_gate_;
   ZCacheStatistics cache_statistics_{*this, "cache"};
@@ -191,7 +200,6 @@ class UntimedZrop : public UntimedUnit {
   BeatLines::Needed needed_;
   SectoredCache::Line line_ = SectoredCache::no_line;  ///< that was looked up last
   QuadBeat beat_;
-  const unsigned quads_per_cycle_;
   BlockPrice blocks_;
   const ScreenTiling tiling_;
   /// The last; by screen tile where bins may time out, in which a primitive's quads may be together that are not so here.

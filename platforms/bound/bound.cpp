@@ -19,11 +19,6 @@ double ratio(std::uint64_t items, std::uint64_t per_cycle) {
   return items == 0 ? 0.0 : static_cast<double>(items) / static_cast<double>(per_cycle);
 }
 
-/// Thousandths of a cycle of which the last item has no more than `longest`: nobody waits for what it takes.
-std::uint64_t without_last(std::uint64_t thousandths, std::uint64_t longest) {
-  return thousandths - std::min(thousandths, longest);
-}
-
 }  // namespace
 
 Pipeline::Pipeline(const UntimedGpu& gpu, unsigned gpc) {
@@ -44,14 +39,14 @@ void Work::add(const Work& other) {
 }
 
 PhaseBound::PhaseBound(const Configuration& configuration, const UntimedGpu& gpu, unsigned gpc) : pipeline_(gpu, gpc) {
-  if (unit(Pipeline::zrop)) zrop_ = dynamic_cast<ZropBehaviour&>(unit(Pipeline::zrop)->behaviour()).timing();
-  if (unit(Pipeline::sm)) sm_ = dynamic_cast<SmBehaviour&>(unit(Pipeline::sm)->behaviour()).timing();
+  if (unit(Pipeline::sm)) sm_ = &dynamic_cast<SmBehaviour&>(unit(Pipeline::sm)->behaviour()).time();
   const Netlist& netlist = configuration.netlist();
   for (const UntimedGpu::Placed& placed : gpu.units()) {
     if (placed.instance->gpc != gpc && !placed.instance->in_front_end) continue;
     const BoundTerms terms = placed.unit->terms();
     terms_.bins_vary |= terms.bins_vary;
     terms_.order_varies |= terms.order_varies;
+    terms_.updates_hide |= terms.updates_hide;
     // Quads (of as many warps, at worst) in CROP's queue, warps in the SMs, and as much again for the links.
     warps_in_phase_ += 2 * placed.unit->room_in_warps();
     if (placed.unit.get() != unit(Pipeline::crop)) continue;
@@ -67,7 +62,7 @@ PhaseBound::PhaseBound(const Configuration& configuration, const UntimedGpu& gpu
 }
 
 std::uint64_t PhaseBound::instructions_of(FragmentShader shader) const {
-  return instructions_in(sm_.fragment_program(shader));
+  return sm_ == nullptr ? 0 : instructions_in(sm_->fragment_program(shader));
 }
 
 std::uint64_t PhaseBound::collected(const Work& done) const {
@@ -92,66 +87,38 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
   };
   std::array<double, stages> cycles{};
   cycles[draw] = least(Pipeline::draw, done, to_last);
-  // Vertices are assembled once their attributes are sent; so many of these may still be on their way.
-  const std::uint64_t sent = std::uint64_t{sm_.fetch.attribute_writes} * sm_.fetch.l1.line_bytes;
-  cycles[vpo] = std::max(least(Pipeline::vpo, done, to_last),
-                         ratio(done.attribute_bytes_written - std::min(done.attribute_bytes_written, sent),
-                               std::uint64_t{sm_.cores} * sm_.fetch.core_bytes));
+  cycles[vpo] = least(Pipeline::vpo, done, to_last);
+  if (sm_ != nullptr) {
+    // Vertices are assembled once their attributes are sent; so many of these may still be on their way.
+    const std::uint64_t sent = std::uint64_t{sm_->fetch.attribute_writes} * sm_->fetch.l1.line_bytes;
+    const std::uint64_t written = done.attribute_bytes_written - std::min(done.attribute_bytes_written, sent);
+    cycles[vpo] = std::max(cycles[vpo], ratio(written, sm_->memory_bytes_per_cycle()));
+  }
   cycles[tgc] = least(Pipeline::tgc, done, to_last);
   cycles[raster] = least(Pipeline::raster, done, to_last);
   cycles[tc] = least(Pipeline::tc, done, to_last);
-  const std::uint64_t z_blocks =
-      to_last ? without_last(tests[ZropWork::blocks], longest_beat_of_blocks()) : tests[ZropWork::blocks];
-  // Beside which beats updates hide is not known phase by phase.
-  const double updates = updates_hide() ? 0.0 : update_cycles(done);
-  cycles[test] = std::max(
-      {ratio(tests[ZropWork::tests], zrop_.quads_per_cycle) + ratio(z_blocks, 1000) + updates + sector_cycles(done),
-       prop_takes(PropWork::bins, collected(done)),
-       from_memory(tests[ZropWork::sectors] * zrop_.z_cache.organization.sector_bytes)});
+  // Late tests are a stage of their own; and beside which beats updates hide is not known phase by phase.
+  Work early = done;
+  early.of[Pipeline::zrop][ZropWork::late_tests] = 0;
+  if (terms_.updates_hide) early.of[Pipeline::zrop][ZropWork::updates] = 0;
+  cycles[test] = std::max({least(Pipeline::zrop, early, to_last), prop_takes(PropWork::bins, collected(done)),
+                           from_memory(tests[ZropWork::bytes_moved])});
   cycles[qru] = least(Pipeline::qru, done, to_last);
   cycles[sm] = least(Pipeline::sm, done, to_last);
-  cycles[late] = std::max(ratio(tests[ZropWork::late_tests], zrop_.quads_per_cycle),
-                          prop_takes(PropWork::late, tests[ZropWork::late_tests]));
+  Work after_shading;
+  after_shading.of[Pipeline::zrop][ZropWork::late_tests] = tests[ZropWork::late_tests];
+  cycles[late] =
+      std::max(least(Pipeline::zrop, after_shading, to_last), prop_takes(PropWork::late, tests[ZropWork::late_tests]));
   cycles[color] = prop_takes(PropWork::color, blends[CropWork::blend]);
   cycles[memory_of_crop] = from_memory(blends[CropWork::bytes_moved]);
   cycles[crop] = unit(Pipeline::crop) == nullptr ? 0 : unit(Pipeline::crop)->least_cycles(blends);
   return cycles;
 }
 
-std::uint64_t PhaseBound::z_sectors_of(std::uint64_t filled) const {
-  const std::uint64_t ahead = zrop_.z_cache.input_quads;
-  const std::uint64_t sectors = filled > ahead ? filled - ahead : 0;
-  return sectors - sectors % zrop_.z_cache.sectors_per_cycle;
-}
-
-bool PhaseBound::updates_hide() const {
-  return zrop_.quads_per_cycle < QuadBeat::capacity || zrop_.block_thousandths != 0 ||
-         zrop_.half_block_thousandths != 0;
-}
-
-double PhaseBound::update_cycles(const Work& done) const {
-  const Work::Items& tests = done.of[Pipeline::zrop];
-  const double updates = ratio(tests[ZropWork::updates], zrop_.updates_per_cycle);
-  if (!updates_hide()) return updates;
-  return std::max(0.0, updates - ratio(tests[ZropWork::tests], zrop_.quads_per_cycle) -
-                           ratio(tests[ZropWork::blocks], 1000));
-}
-
-double PhaseBound::sector_cycles(const Work& done) const {
-  // A cycle in which sectors move may be the last that a block takes part of.
-  const Work::Items& tests = done.of[Pipeline::zrop];
-  return std::max(0.0, ratio(tests[ZropWork::sectors], zrop_.z_cache.sectors_per_cycle) -
-                           ratio(tests[ZropWork::blocks], 1000));
-}
-
-std::uint64_t PhaseBound::longest_beat_of_blocks() const {
-  return std::uint64_t{QuadBeat::capacity} * std::max(zrop_.half_block_thousandths, zrop_.block_thousandths);
-}
-
 double PhaseBound::idle_after_last(unsigned stage) const {
-  if (stage == test) return ratio(longest_beat_of_blocks(), 1000);
   const Pipeline::Place place = stage == draw     ? Pipeline::draw
                                 : stage == raster ? Pipeline::raster
+                                : stage == test   ? Pipeline::zrop
                                 : stage == sm     ? Pipeline::sm
                                                   : Pipeline::places;
   return place == Pipeline::places || unit(place) == nullptr ? 0.0 : unit(place)->idle_after_last();
@@ -180,7 +147,7 @@ void PhaseBound::end_phase() {
     ended_ = total_;
     ended_.add(up_to_quads_);
     // Late tests, which are a stage of their own, and updates share the port of the others.
-    if (ended_.of[Pipeline::zrop][ZropWork::late_tests] > 0 || updates_hide())
+    if (ended_.of[Pipeline::zrop][ZropWork::late_tests] > 0 || terms_.updates_hide)
       last_quad_ = std::max(last_quad_, least(Pipeline::zrop, ended_, true));
   } else if (!has_quads()) {
     Work passed = work;
@@ -217,17 +184,6 @@ std::vector<OccupancyPart> PhaseBound::parts_of(Pipeline::Place place, const Wor
       items[PropWork::color] = done.of[Pipeline::crop][CropWork::blend];
       items[PropWork::late] = tests[ZropWork::late_tests];
       return unit(place)->least_parts(items, false);
-    case Pipeline::zrop: {
-      const std::vector<WorkKind> kinds = ZropWork::kinds(zrop_);
-      const double taken[] = {static_cast<double>(tests[ZropWork::tests]), update_cycles(done),
-                              sector_cycles(done) * zrop_.z_cache.sectors_per_cycle,
-                              static_cast<double>(tests[ZropWork::late_tests]),
-                              static_cast<double>(without_last(tests[ZropWork::blocks], longest_beat_of_blocks()))};
-      std::vector<OccupancyPart> parts;
-      for (const WorkKind& kind : kinds)
-        parts.push_back({kind.name, kind.resource, taken[parts.size()] * kind.cycles_per_item, kind.is_throughput});
-      return parts;
-    }
     case Pipeline::qru: {
       // A launch ends a cycle.
       const auto rate = static_cast<std::uint64_t>(1 / unit(place)->work()[QruWork::quads].cycles_per_item + 0.5);

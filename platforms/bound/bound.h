@@ -93,9 +93,6 @@ class PhaseBound {
   /// Up to the last quad; without quads, of what the front end does all the same.
   double cycles() const { return last_quad_; }
   bool has_quads() const { return ended_.rasterized() > 0; }
-  /// Of so many sectors that every run fills into the z-cache in a phase, those that no earlier phase can have filled for it:
-  /// look-ups run ahead by the quads of a queue.
-  std::uint64_t z_sectors_of(std::uint64_t filled) const;
   /// What runs with time may do otherwise than the one whose work this counts.
   const BoundTerms& terms() const { return terms_; }
 
@@ -116,18 +113,11 @@ class PhaseBound {
   /// Of the quads that were rasterised, those that came to TC.
   std::uint64_t collected(const Work& done) const;
   double from_memory(std::uint64_t bytes) const;
-  double update_cycles(const Work& done) const;
-  /// Beside beats that take several cycles updates take nothing of their own.
-  bool updates_hide() const;
-  double sector_cycles(const Work& done) const;
-  /// Thousandths of a cycle of one beat's tests.
-  std::uint64_t longest_beat_of_blocks() const;
   /// Between a stage's items are more cycles than an item takes: those after the last, for which nobody waits.
   double idle_after_last(unsigned stage) const;
 
   const Pipeline pipeline_;
-  ZropBehaviour::TimingParameters zrop_{1, 1, 1};
-  SmBehaviour::TimingParameters sm_{};
+  const SmTime* sm_ = nullptr;  ///< where there is one
   std::string memory_;
   std::uint32_t memory_bytes_per_cycle_ = 0;  ///< 0: a memory of which nothing is known
   BoundTerms terms_;

@@ -209,11 +209,12 @@ void WorkCounter::count() {
   if (counts_late_) count(Pipeline::sm, SmWork::visits);
   if (counts_late_) count(Pipeline::zrop, ZropWork::late_tests);
   Work::Items& tests = work.of[Pipeline::zrop];
-  tests[ZropWork::sectors] = bound_.z_sectors_of(items(Pipeline::zrop, ZropWork::sectors) - z_sectors_before_);
+  tests[ZropWork::sectors] = items(Pipeline::zrop, ZropWork::sectors) - z_sectors_before_;
+  if (const UntimedUnit* const zrop = unit(Pipeline::zrop)) zrop->leave_out_pending(tests);
   if (!hides_at_other_times_) return;
   tests[ZropWork::tests] = work.survivors();
   work.of[Pipeline::tc][TcWork::beats] = 0;
-  tests[ZropWork::blocks] = tests[ZropWork::sectors] = 0;
+  tests[ZropWork::blocks] = tests[ZropWork::sectors] = tests[ZropWork::bytes_moved] = 0;
 }
 
 void WorkCounter::end_phase() {

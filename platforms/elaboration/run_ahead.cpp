@@ -114,7 +114,7 @@ class RunAhead::RecordingSm final : public SmBehaviour {
     record_.shaded(out);
   }
   void shade_vertices(const VertexWarp& warp) override { sm_->shade_vertices(warp); }
-  TimingParameters timing() const override { return sm_->timing(); }
+  const SmTime& time() const override { return sm_->time(); }
 
  private:
   std::unique_ptr<SmBehaviour> sm_;
@@ -150,7 +150,7 @@ class RunAhead::RepeatingSm final : public SmBehaviour {
   const Behaviour& unit() const override { return sm_.unit(); }
   void shade(const Warp& warp, ShadedWarp& out) override { record_.repeat(warp, out); }
   void shade_vertices(const VertexWarp& warp) override { sm_.shade_vertices(warp); }
-  TimingParameters timing() const override { return sm_.timing(); }
+  const SmTime& time() const override { return sm_.time(); }
 
  private:
   SmBehaviour& sm_;
@@ -222,7 +222,7 @@ class RunAhead::RepeatingZrop final : public ZropBehaviour {
   void update(const TerminationSignal& signal) override { zrop_->update(signal); }
   void pass(Mark mark) override { zrop_->pass(mark); }
   void follow(FunctionalRunAhead& run_ahead) override { zrop_->follow(run_ahead); }
-  TimingParameters timing() const override { return zrop_->timing(); }
+  const ZropTime& time() const override { return zrop_->time(); }
 
  private:
   std::unique_ptr<ZropBehaviour> zrop_;

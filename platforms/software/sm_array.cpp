@@ -138,7 +138,7 @@ bool is_empty(const Core& core) {
 
 }  // namespace
 
-SmArray::SmArray(const SmBehaviour::TimingParameters& array, const RenderBehaviour::TimingParameters& kernel)
+SmArray::SmArray(const SmTime& array, const RenderBehaviour::TimingParameters& kernel)
     : cores_(array.cores),
       blocks_per_core_(kernel.blocks_per_core),
       schedulers_(array.schedulers_per_core),

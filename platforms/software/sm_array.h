@@ -15,7 +15,7 @@ namespace vrpipe {
 /// fluid: no instruction has a cycle of its own.
 class SmArray {
  public:
-  SmArray(const SmBehaviour::TimingParameters& array, const RenderBehaviour::TimingParameters& kernel);
+  SmArray(const SmTime& array, const RenderBehaviour::TimingParameters& kernel);
 
   /// Cycles that no schedule of the blocks can undercut: that of all their instructions, and that of the longest block.
   struct Least {

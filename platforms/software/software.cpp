@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -42,8 +43,8 @@ class SoftwareMachine {
     std::uint32_t cores = 0;
     for (const Instance& instance : configuration_.netlist().instances()) {
       if (instance.slot == "sm") {
-        array_ = configuration_.make_as<SmBehaviour>(instance)->timing();
-        cores += array_.cores;
+        array_ = configuration_.make_as<SmBehaviour>(instance)->time();
+        cores += array_->cores;
       } else if (instance.slot == "dram") {
         bytes_per_cycle_ += configuration_.make_as<MemoryBehaviour>(instance)->timing().bytes_per_cycle;
       }
@@ -52,11 +53,11 @@ class SoftwareMachine {
       throw UserError("cannot render in software", "platform " + request.platform->name, "it has no SM array",
                       "take another platform");
     }
-    array_.cores = cores;
+    array_->cores = cores;
   }
 
   const RenderContext& context() const { return configuration_.context_of(0); }
-  const SmBehaviour::TimingParameters& array() const { return array_; }
+  const SmTime& array() const { return *array_; }
   double cycles_of(double microseconds) const { return microseconds * configuration_.platform().frequency_mhz; }
   /// Of moving bytes; 0 where no memory is modelled.
   double memory_cycles(std::uint64_t bytes) const {
@@ -65,13 +66,13 @@ class SoftwareMachine {
 
   KernelReport report(const KernelWork& work) const {
     constexpr double issue_of_an_sm = 4;  // as KernelWork has it
-    const double sm_cycles = work.sm_cycles * issue_of_an_sm / array_.instructions_per_cycle();
+    const double sm_cycles = work.sm_cycles * issue_of_an_sm / array_->instructions_per_cycle();
     const double memory = memory_cycles(work.bytes);
     KernelReport reported = report(work.name, work.items, work.bytes, {{sm_part, sm_cycles}, {memory_part, memory}},
                                    work.launch_microseconds);
     reported.warp_instructions = work.warp_instructions;
     if (work.warp_instructions) reported.lane_instructions = 32 * *work.warp_instructions;
-    if (reported.cycles) reported.core_cycles = array_.cores * std::max(sm_cycles, memory);
+    if (reported.cycles) reported.core_cycles = array_->cores * std::max(sm_cycles, memory);
     return reported;
   }
   /// The longest of what goes side by side, and launching.
@@ -106,7 +107,7 @@ class SoftwareMachine {
 
   const Configuration configuration_;
   const bool has_time_;
-  SmBehaviour::TimingParameters array_{};
+  std::optional<SmTime> array_;  ///< of all GPCs
   std::uint64_t bytes_per_cycle_ = 0;
 };
 

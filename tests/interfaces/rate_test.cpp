@@ -54,6 +54,25 @@ TEST(RateLimit, UnusedCyclesAreLostAndFractionsKept) {
   EXPECT_EQ(limit.allowance(901), 1u);
 }
 
+TEST(RateLimit, WhatGoesAndWhatIsLostIsNoMoreThanTheTimeThatThereIs) {
+  for (const Rate rate : {Rate{39, 32}, Rate{3, 2}, Rate{17, 64}, Rate{4, 1}}) {
+    RateLimit told(rate), untold(rate);
+    std::uint64_t parts = 0;
+    for (Cycle now = 0; now < 3000; ++now) {
+      const std::uint32_t count = told.allowance(now);
+      ASSERT_EQ(count, untold.allowance(now)) << "the fraction is kept either way";
+      const bool goes = mix(now) % 3 == 0;
+      parts += goes ? std::uint64_t{count} * rate.cycles : told.lose_rest();
+      if (goes) {
+        told.take(count);
+        untold.take(count);
+      }
+      ASSERT_LE(parts, (now + 1) * rate.items);
+      ASSERT_GE(parts + rate.cycles, (now + 1) * rate.items + 1);
+    }
+  }
+}
+
 TEST(BatchLimit, BatchesThatFitShareACycle) {
   BatchLimit limit(16);
   EXPECT_TRUE(limit.allows(10, 5));

@@ -182,13 +182,9 @@ struct QruOfAnotherSplat : PairingQru {
     return launched;
   }
 };
-struct SmWithoutCores : SplatShader {
+struct SmWithoutTime : SplatShader {
   using SplatShader::SplatShader;
-  TimingParameters timing() const override {
-    TimingParameters timing = SplatShader::timing();
-    timing.cores = 0;
-    return timing;
-  }
+  const SmTime& time() const override { throw 7; }
 };
 struct SmThatForgetsAWarp : SplatShader {
   using SplatShader::SplatShader;
@@ -280,7 +276,7 @@ const Add<QruOf<9>, QruBehaviour> qru_9("qru", "warps-of-9", "a warp of 9 quads"
 const Add<QruOf<255>, QruBehaviour> qru_255("qru", "warps-of-255", "a warp of 255 quads");
 const Add<QruThatNeverFinishes, QruBehaviour> qru_ends("qru", "endless", "finish_bin: a warp of");
 const Add<QruOfAnotherSplat, QruBehaviour> qru_splat("qru", "other-splat", "splat 123456789 for draw 0, which has");
-const Add<SmWithoutCores, SmBehaviour> sm_cores("sm", "no-cores", "cores is 0");
+const Add<SmWithoutTime, SmBehaviour> sm_time("sm", "no-time", "time throws an exception of unknown type");
 const Add<SmThatForgetsAWarp, SmBehaviour> sm_warp("sm", "forgets", "quads_pruned + quads_merged counts");
 const Add<CropWithoutCounts, CropBehaviour> crop_counts("crop", "no-counts", "quads_dropped_late counts 0, but");
 const AddCrop crop_time(CropMaker<CropWithoutTime>::implementation("no-time", "breaks a rule"),
@@ -444,7 +440,7 @@ struct ZropForDraw0 : ZropBehaviour {
   }
   void pass(Mark mark) override { unit_.pass(mark); }
   void follow(FunctionalRunAhead& run_ahead) override { unit_.follow(run_ahead); }
-  TimingParameters timing() const override { return unit_.timing(); }
+  const ZropTime& time() const override { return unit_.time(); }
   DepthStencilRop unit_;
 };
 struct SmForDraw0 : SmBehaviour {
@@ -455,7 +451,7 @@ struct SmForDraw0 : SmBehaviour {
     count_for_draw_0(*this, unit_);
   }
   void shade_vertices(const VertexWarp& warp) override { unit_.shade_vertices(warp); }
-  TimingParameters timing() const override { return unit_.timing(); }
+  const SmTime& time() const override { return unit_.time(); }
   SplatShader unit_;
 };
 /// Shades a draw's quads as if they were of the first.

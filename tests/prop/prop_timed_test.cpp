@@ -207,6 +207,19 @@ TEST_F(PropTimedTest, ColourBytesThatAreNoWholeQuadsPassAtTheirRateExactly) {
   }
 }
 
+TEST_F(PropTimedTest, AtAFractionOfAQuadQuadsAndEmptyWarpsKeepTheWayToCropNoLongerThanThereIsTime) {
+  for (const unsigned bytes : {17U, 39U, 48U, 96U}) {
+    ColorBench prop(Fidelity::lt, context, {{"color_bytes_per_cycle", std::to_string(bytes)}}, 4096, 4096);
+    for (std::uint32_t i = 1; i < 600; ++i) prop.shaded.add({warp(i, {0, 0}, i, i % 3 == 0 ? 1 : 0)});
+    prop.shaded.add({warp(0)}, 1000);
+    prop.bench.run();
+    const auto cycles = static_cast<double>(prop.release.records().back().cycle - 1001);
+    const double empty = testing::occupied(prop.bench.unit(), PropWork::empty_warps);
+    EXPECT_GT(empty, 0) << bytes;
+    EXPECT_LE(testing::occupied(prop.bench.unit(), PropWork::color) + empty, cycles) << bytes;
+  }
+}
+
 TEST_F(PropTimedTest, ShadedOutOfOrderWarpsLeaveInTheOrderOfTheirTile) {
   for (const char* order : {"draw", "tile"}) {
     ColorBench prop(Fidelity::lt, context, {{"order", order}});

@@ -4,9 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <vrpipe/pipeline/slots/prop.h>
 #include <vrpipe/testkit/bench.h>
 
 #include "support/builders.h"
+#include "support/fidelities.h"
 
 namespace vrpipe {
 namespace {
@@ -144,6 +146,24 @@ TEST_F(PropUnitTest, ColourBytesThatAreNoWholeQuadsPassAtTheirRateExactly) {
             << bytes << " " << name_of(format);
       }
     }
+  }
+}
+
+TEST_F(PropUnitTest, AtAFractionOfAQuadQuadsAndEmptyWarpsKeepTheWayToCropNoLongerThanThereIsTime) {
+  for (const unsigned bytes : {17U, 39U, 48U, 96U}) {
+    Bench bench("prop", "pre-rop", context, {{"color_bytes_per_cycle", std::to_string(bytes)}});
+    Source<ShadedWarpItem>& shaded = bench.source<ShadedWarpItem>("in_shaded", 64);
+    bench.sink<ColorBeat>("out_color", 64);
+    Sink<WarpRelease>& release = bench.sink<WarpRelease>("out_release");
+    // All wait for the first. Of three, one has a quad.
+    for (std::uint32_t i = 1; i < 600; ++i) shaded.add({warp(i, {0, 0}, i, i % 3 == 0 ? 1 : 0)});
+    shaded.add({warp(0, {0, 0}, 0)}, 1000);
+    bench.run();
+    // And the fraction of a quad that is kept of the cycles before these.
+    const double cycles = static_cast<double>(release.records().back().cycle - 1001) + 31.0 / bytes;
+    const double empty = testing::occupied(bench.unit(), PropWork::empty_warps);
+    EXPECT_GT(empty, 0) << bytes;
+    EXPECT_LE(testing::occupied(bench.unit(), PropWork::color) + empty, cycles) << bytes;
   }
 }
 

@@ -26,11 +26,6 @@ class HandOverTest : public ::testing::TestWithParam<Fidelity> {
     }
     return warp;
   }
-  static SmBehaviour::TimingParameters priced(HandOverPrice price) {
-    SmBehaviour::TimingParameters timing{1, 1, 32, 1, 1, 1, {}, {}, {}};
-    timing.hand_over = price;
-    return timing;
-  }
   /// Cycles of a warp, of those that `make` gives, where nothing else takes longer.
   double cycles_of_a_warp(const std::vector<Warp>& in_turn, const Bench::Settings& settings) {
     const auto cycles = [&](unsigned count) {

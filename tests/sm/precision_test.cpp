@@ -35,7 +35,7 @@ struct Shaded {
     for (std::uint32_t i = 0; i < (merges ? 2U : 1U); ++i) warp.quads[warp.count++] = {i, 0, all_lanes, 0, 0};
     warp.merge_pairs = merges ? 1 : 0;
     sm.shade(warp, out);
-    attribute_bytes = sm.timing().fetch.attribute_bytes;
+    attribute_bytes = sm.time().fetch.attribute_bytes;
   }
   double alpha(unsigned lane = 0) const { return static_cast<double>(out.color[0].alpha[lane]); }
   double red(unsigned lane = 0) const { return static_cast<double>(out.color[0].red[lane]); }

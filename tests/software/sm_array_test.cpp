@@ -6,6 +6,8 @@
 
 #include <vrpipe/arithmetic/random.h>
 
+#include "sm/sm_parameters.h"
+
 namespace vrpipe {
 namespace {
 
@@ -14,7 +16,7 @@ constexpr double interval = 7;
 
 /// Cores of four schedulers of 32 lanes.
 SmArray array_of(std::uint32_t cores, std::uint32_t blocks_per_core = 8, std::uint32_t lanes = 32) {
-  SmBehaviour::TimingParameters array{};
+  SmTime array{SmParameters(), DevicePrecision()};
   array.cores = cores;
   array.schedulers_per_core = 4;
   array.lanes_per_scheduler = lanes;

@@ -68,58 +68,45 @@ TEST(BlockPrice, DoesNotDependOnWhereBeatsEnd) {
 }
 
 /// What was said, by cycle.
-class Said {
+class SaidBlocks {
  public:
-  void settle(BlockTime& time, Cycle now) {
-    time.settle(now, [this](std::uint64_t thousandths, Cycle from, Cycle until) {
-      ASSERT_LT(from, until);
-      for (Cycle cycle = from; cycle < until; ++cycle) of_cycle[cycle] += thousandths / (until - from);
-    });
-  }
+  explicit SaidBlocks(std::uint32_t quads_per_cycle)
+      : time(quads_per_cycle, [this](std::uint64_t thousandths, Cycle from, Cycle until) {
+          ASSERT_LT(from, until);
+          for (Cycle cycle = from; cycle < until; ++cycle) of_cycle[cycle] += thousandths / (until - from);
+        }) {}
+  BlockTime time;
   std::map<Cycle, std::uint64_t> of_cycle;
 };
 
 TEST(BlockTime, IsWhatQuadsLeave) {
-  BlockTime time(8);
-  Said said;
-  time.pay(0, 3400);
-  time.test(0, 4);
-  said.settle(time, 0);
+  SaidBlocks said(8);
+  said.time.test(0, 4, 3400);
+  said.time.settle(0);
   EXPECT_TRUE(said.of_cycle.empty()) << "others may come in this cycle";
-  said.settle(time, 3);
+  said.time.settle(3);
   EXPECT_EQ(said.of_cycle, (std::map<Cycle, std::uint64_t>{{0, 500}, {1, 1000}, {2, 1000}}));
   // In the last cycle 400 of the block are left, beside which quads are tested.
-  time.pay(3, 0);
-  time.test(3, 2);
-  said.settle(time, never);
+  said.time.test(3, 2, 0);
+  said.time.settle(never);
   EXPECT_EQ(said.of_cycle[3], 150U);
-  said.settle(time, never);
+  said.time.settle(never);
   EXPECT_EQ(said.of_cycle[3], 150U) << "once";
 }
 
 TEST(BlockTime, IsNotThatOfAWholeCycleThatGoesToOthers) {
-  BlockTime time(8);
-  Said said;
-  time.pay(0, 1400);
-  time.test(0, 1);
-  said.settle(time, 1);
-  time.take_cycle(1);
-  said.settle(time, 7);
-  time.pay(7, 2000);
-  time.test(7, 16);
-  said.settle(time, never);
+  SaidBlocks said(8);
+  said.time.test(0, 1, 1400);
+  said.time.take_cycle(1);
+  said.time.test(7, 16, 2000);
+  said.time.settle(never);
   EXPECT_EQ(said.of_cycle, (std::map<Cycle, std::uint64_t>{{0, 875}}));
 }
 
 TEST(BlockTime, IsWholeThousandthsOfRatesThatAreNone) {
-  BlockTime time(3);
-  Said said;
-  for (Cycle cycle = 0; cycle < 300; ++cycle) {
-    said.settle(time, cycle);
-    time.pay(cycle, 1000);
-    time.test(cycle, 1);
-  }
-  said.settle(time, never);
+  SaidBlocks said(3);
+  for (Cycle cycle = 0; cycle < 300; ++cycle) said.time.test(cycle, 1, 1000);
+  said.time.settle(never);
   std::uint64_t sum = 0;
   for (const auto& [cycle, thousandths] : said.of_cycle) sum += thousandths;
   EXPECT_EQ(sum, 200'000U);

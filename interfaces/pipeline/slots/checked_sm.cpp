@@ -44,30 +44,10 @@ class CheckedSm final : public CheckedSlot<SmBehaviour> {
   void shade_vertices(const VertexWarp& warp) override {
     ask("shade_vertices", [&] { checked_->shade_vertices(warp); });
   }
-  TimingParameters timing() const override {
-    TimingParameters timing = ask("timing", [&] { return checked_->timing(); });
-    check_rate("cores", timing.cores);
-    check_rate("schedulers_per_core", timing.schedulers_per_core);
-    check_rate("lanes_per_scheduler", timing.lanes_per_scheduler, 32);
-    if (32 % timing.lanes_per_scheduler != 0) {
-      fault("timing", "lanes_per_scheduler is {}, no divisor of 32", timing.lanes_per_scheduler);
-    }
-    check_rate("warps_per_core", timing.warps_per_core);
-    check_rate("vertex_warps", timing.vertex_warps);
-    check_rate("warps_to_one_core", timing.warps_to_one_core, ~0U);
-    if (timing.vertex.empty() || timing.fragment.empty()) fault("timing", "a shader program without a segment");
-    for (const auto* program :
-         {&timing.vertex, &timing.fragment, &timing.mesh, &timing.alpha_threshold, &timing.merge}) {
-      for (const ShaderSegment& segment : *program) {
-        if (segment.instructions > longest_latency || segment.stall_cycles > longest_latency) {
-          fault("timing", "a segment of {} instructions and {} cycles", segment.instructions, segment.stall_cycles);
-        }
-      }
-    }
-    timing.fetch.check();
-    return timing;
+  const SmTime& time() const override {
+    return ask("time", [&]() -> const SmTime& { return checked_->time(); });
   }
-  void check_timing() const override { timing(); }
+  void check_timing() const override { time(); }
   void check_counters() const override {
     check_counter("fragment_warps", checked_->fragment_warps.value(), warps_, "warps came in");
     check_by_draw("quads_shaded", {&checked_->quads_shaded}, shaded_, "quads came in");

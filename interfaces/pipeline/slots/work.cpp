@@ -1,10 +1,8 @@
 #include <vrpipe/pipeline/slots/draw.h>
 #include <vrpipe/pipeline/slots/qru.h>
-#include <vrpipe/pipeline/slots/sm.h>
 #include <vrpipe/pipeline/slots/tgc.h>
 #include <vrpipe/pipeline/slots/vpo.h>
 #include <vrpipe/pipeline/slots/wdx.h>
-#include <vrpipe/pipeline/slots/zrop.h>
 
 namespace vrpipe {
 
@@ -31,25 +29,8 @@ std::vector<WorkKind> TgcWork::kinds(const Throughput& timing) {
   return {{"bin entries", 0, per(timing.items_per_cycle), throughput}, {"read-out", 1, 1.0, false}};
 }
 
-std::vector<WorkKind> ZropWork::kinds(const ZropBehaviour::TimingParameters& timing) {
-  return {{"tests", 0, per(timing.quads_per_cycle), throughput},
-          {"updates", 0, 1.0, false},
-          {"sectors", 0, per(timing.z_cache.sectors_per_cycle), false},
-          {"late tests", 0, per(timing.quads_per_cycle), throughput},
-          {"blocks", 0, per(1000), false}};
-}
-
 std::vector<WorkKind> QruWork::kinds(const Throughput& timing) {
   return {{"quads", 0, per(timing.items_per_cycle), throughput}, {"launches", 0, 1.0, false}};
-}
-
-std::vector<WorkKind> SmWork::kinds(const SmBehaviour::TimingParameters& timing) {
-  const double issue = per(timing.instructions_per_cycle());
-  return {{"vertices", 0, issue, throughput},
-          {"fragments", 0, issue, throughput},
-          {"merging", 0, issue, throughput},
-          {"launches", 1, per(1000), false},
-          {"visits", 2, per(1000), false}};
 }
 
 }  // namespace vrpipe

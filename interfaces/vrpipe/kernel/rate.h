@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <numeric>
+#include <utility>
 
 #include <vrpipe/kernel/accounting.h>
 
@@ -40,6 +41,12 @@ class RateLimit {
   }
   /// `count` items go: not more than the allowance of the cycle.
   void take(std::uint32_t count) { tokens_ -= std::uint64_t{count} * rate_.cycles; }
+  /// No more go in this cycle: what is left of it is lost, but for a fraction of an item. Returns what is, in parts of which
+  /// a cycle has `Rate::items`, and an item takes `Rate::cycles`.
+  std::uint64_t lose_rest() {
+    const std::uint64_t kept = std::min<std::uint64_t>(tokens_, rate_.cycles - 1);
+    return std::exchange(tokens_, kept) - kept;
+  }
 
  private:
   Rate rate_;

@@ -153,6 +153,7 @@ struct BoundTerms {
   bool bins_vary = false;  ///< they are flushed at other times: what a quad terminates may spare others later than here
   bool order_varies = false;  ///< screen tiles are blended in another order
   std::uint32_t memory_latency_cycles = 0;
+  bool updates_hide = false;  ///< of termination, beside tests that take longer
 };
 
 /// A unit without time: a functional model with ports.

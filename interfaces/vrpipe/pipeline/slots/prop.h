@@ -21,7 +21,8 @@ class PropBehaviour : public Behaviour {
 
 /// The slot's kinds of work.
 struct PropWork {
-  enum : unsigned { bins, tested, color, empty_warps, late };  ///< `late`: quads to be tested late
+  /// Quads, those to be tested late as well; and what empty warps take of the way to CROP, in parts of a cycle (RateLimit).
+  enum : unsigned { bins, tested, color, empty_warps, late };
 };
 
 /// The slot's SlotCheck.

@@ -35,8 +35,6 @@ struct AttributeFetch {
   std::uint32_t l1_mshrs = 384;          ///< sectors that a core may have asked for
   CacheOrganization l1{49152};           ///< lines of 128 bytes, sectors of 32; of 0 bytes: none
   bool has_l1() const { return l1.bytes != 0; }
-  /// Throws UserError for what cannot be.
-  void check() const;
 };
 
 /// What handing fragment warps to cores takes beyond a cycle each, in thousandths of a cycle. Warps and visits go side by side.
@@ -50,6 +48,45 @@ struct HandOverPrice {
   }
 };
 
+struct SmParameters;
+
+/// What an SM array's work takes, by its parameters (modules/sm/sm_parameters.h): all that its models of `cycle`, `lt` and
+/// `bound` ask for, and kernels that run on it in place of the pipeline.
+struct SmTime {
+  /// Throws UserError for an array that cannot be.
+  SmTime(const SmParameters& parameters, const DevicePrecision& precision);
+
+  std::uint32_t cores;
+  std::uint32_t schedulers_per_core;
+  std::uint32_t lanes_per_scheduler;  ///< a divisor of 32
+  std::uint32_t warps_per_core;
+  std::uint32_t vertex_warps;       ///< of the array that may be in flight
+  std::uint32_t warps_to_one_core;  ///< consecutive warps of a tile that go to one core
+  /// The first stall of the vertex and of the fragment program is that of fetching what it reads; where the memory port
+  /// is connected the memory says how long that takes.
+  std::vector<ShaderSegment> vertex;
+  std::vector<ShaderSegment> fragment;
+  std::vector<ShaderSegment> mesh;             ///< the fragment program of meshes
+  std::vector<ShaderSegment> alpha_threshold;  ///< of FragmentShader::alpha_threshold
+  std::vector<ShaderSegment> merge;            ///< appended for a warp with pairs
+  AttributeFetch fetch;
+  HandOverPrice hand_over;
+
+  /// The fragment program of draws with a shader.
+  const std::vector<ShaderSegment>& fragment_program(FragmentShader shader) const;
+  /// Fragment warps in flight in the array: no more than slots have numbers.
+  std::uint32_t fragment_slots() const { return cores * warps_per_core; }
+  /// Cycles for which an instruction of a warp has its scheduler.
+  std::uint32_t cycles_per_instruction() const { return 32 / lanes_per_scheduler; }
+  std::uint32_t schedulers() const { return cores * schedulers_per_core; }
+  /// Warp instructions that the array issues at most.
+  double instructions_per_cycle() const { return double{1} * schedulers() / cycles_per_instruction(); }
+  /// Of the array's memory port.
+  std::uint32_t memory_bytes_per_cycle() const { return cores * fetch.core_bytes; }
+  /// As in SmWork.
+  std::vector<WorkKind> kinds() const;
+};
+
 /// Slot `sm`: vertex and fragment shading, alpha pruning, quad merging.
 class SmBehaviour : public Behaviour {
  public:
@@ -58,32 +95,8 @@ class SmBehaviour : public Behaviour {
   /// Shades, prunes and merges: fills `out` but for its slot and its pool, which are the module's.
   virtual void shade(const Warp& warp, ShadedWarp& out) = 0;
   virtual void shade_vertices(const VertexWarp& warp) = 0;
-  struct TimingParameters {
-    std::uint32_t cores;
-    std::uint32_t schedulers_per_core;
-    std::uint32_t lanes_per_scheduler;  ///< a divisor of 32
-    std::uint32_t warps_per_core;
-    std::uint32_t vertex_warps;       ///< of the array that may be in flight
-    std::uint32_t warps_to_one_core;  ///< consecutive warps of a tile that go to one core
-    /// The first stall of the vertex and of the fragment program is that of fetching what it reads; where the memory port
-    /// is connected the memory says how long that takes.
-    std::vector<ShaderSegment> vertex;
-    std::vector<ShaderSegment> fragment;
-    std::vector<ShaderSegment> merge;  ///< appended for a warp with pairs
-    AttributeFetch fetch = {};
-    std::vector<ShaderSegment> mesh = {};             ///< the fragment program of meshes; none: `fragment`
-    std::vector<ShaderSegment> alpha_threshold = {};  ///< of FragmentShader::alpha_threshold; none: `fragment`
-    HandOverPrice hand_over = {};
-    /// The fragment program of draws with a shader.
-    const std::vector<ShaderSegment>& fragment_program(FragmentShader shader) const;
-    /// Fragment warps in flight in the array. Throws UserError if they are more than slots have numbers.
-    std::uint32_t fragment_slots() const;
-    /// Cycles for which an instruction of a warp has its scheduler.
-    std::uint32_t cycles_per_instruction() const { return 32 / lanes_per_scheduler; }
-    /// Warp instructions that the array issues at most.
-    double instructions_per_cycle() const { return double{1} * cores * schedulers_per_core / cycles_per_instruction(); }
-  };
-  virtual TimingParameters timing() const = 0;
+  /// What its work takes: the parameters of its timing models.
+  virtual const SmTime& time() const = 0;
 
   void use_surfaces(Framebuffer& framebuffer) override { attach(framebuffer.color); }
   void add_to(Counts& counts, const CountOf& of) const override {
@@ -118,11 +131,10 @@ class SmBehaviour : public Behaviour {
   const ColorSurface* surface_ = nullptr;
 };
 
-/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
+/// The slot's kinds of work.
 struct SmWork {
   /// Warp instructions; and handing warps to cores, in thousandths of a cycle.
   enum : unsigned { vertex, fragment, merge, launches, visits };
-  static std::vector<WorkKind> kinds(const SmBehaviour::TimingParameters& timing);
 };
 
 /// The slot's SlotCheck.

@@ -12,6 +12,8 @@
 
 namespace vrpipe {
 
+struct ZropTime;
+
 /// Strict termination: what the bins tested so far will have terminated, whenever their quads reach CROP.
 class FunctionalRunAhead {
  public:
@@ -63,17 +65,8 @@ class ZropBehaviour : public Behaviour {
   /// Strict mode at fidelities with time: termination comes from `run_ahead`, and `update` only costs time.
   /// Late tests are run ahead as well: `test_late` is called from within `run_ahead.tested`, and not when time comes.
   virtual void follow(FunctionalRunAhead& run_ahead) = 0;
-  struct TimingParameters {
-    std::uint32_t quads_per_cycle;
-    std::uint32_t latency_cycles;
-    std::uint32_t updates_per_cycle;  ///< signals; a cycle with updates tests no quads: one z-cache port
-    ZCache z_cache = {};
-    /// Thousandths of a cycle for each half (4x8 pixels) of an 8x8 block in which a primitive has quads to be tested before
-    /// shading, and the least of a block; both 0: quads alone take time.
-    std::uint32_t half_block_thousandths = 0;
-    std::uint32_t block_thousandths = 0;
-  };
-  virtual TimingParameters timing() const = 0;
+  /// What its work takes: the parameters of its timing models (modules/zrop/zrop_time.h).
+  virtual const ZropTime& time() const = 0;
 
   void use_surfaces(Framebuffer& framebuffer) override { attach(framebuffer.depth_stencil); }
   void add_to(Counts& counts, const CountOf& of) const override {
@@ -114,12 +107,13 @@ class ZropBehaviour : public Behaviour {
   DepthStencilSurface* surface_ = nullptr;
 };
 
-/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
+/// The slot's kinds of work.
 struct ZropWork {
   /// Quads tested before shading, cycles with updates, sectors moved, quads tested after shading; in thousandths of a cycle,
   /// what the blocks that quads touch take beyond their number.
-  enum : unsigned { tests, updates, sectors, late_tests, blocks };
-  static std::vector<WorkKind> kinds(const ZropBehaviour::TimingParameters& timing);
+  enum : unsigned { tests, updates, sectors, late_tests, blocks, kinds };
+  /// And what is counted for `bound`.
+  enum : unsigned { bytes_moved = kinds };
 };
 
 /// The slot's SlotCheck.
