@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "z_cache.h"
+
 #include <vrpipe/memory/sectors.h>
 #include <vrpipe/pipeline/quad_sectors.h>
 #include <vrpipe/pipeline/slots/zrop.h>

@@ -2,6 +2,8 @@
 
 #include <optional>
 
+#include "z_cache.h"
+
 #include <vrpipe/memory/cache_statistics.h>
 #include <vrpipe/memory/cleared_sectors.h>
 #include <vrpipe/pipeline/slots/zrop.h>

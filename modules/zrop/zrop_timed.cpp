@@ -153,7 +153,8 @@ class TimedZrop : public TimedUnit {
     }
     std::vector<Quad>& quads = item.storage->flush.quads;
     const unsigned total = item.quads;
-    const unsigned parts = count_parts(quads, total);
+    const unsigned of_beat = quads_of_beat(item);
+    const unsigned parts = count_parts(quads, total, of_beat);
     CycleInterval tested(never, 0);
     CycleInterval left(never, 0);
     CycleInterval looked_up(never, 0);
@@ -169,7 +170,7 @@ class TimedZrop : public TimedUnit {
     beat.tile = item.tile;
     item.quads = item.beats = 0;
     for (unsigned part = 0, from = 0, end = 0; part < parts; ++part, from = end) {
-      end = end_of_part(quads, from, total);
+      end = end_of_part(quads, from, total, of_beat);
       beat.count = static_cast<std::uint8_t>(end - from);
       beat.last_of_bin = part + 1 == parts;
       std::copy_n(quads.begin() + from, beat.count, beat.quads.begin());
@@ -214,17 +215,22 @@ class TimedZrop : public TimedUnit {
     return {tested.first, std::max(tested.last, taken.last)};
   }
 
-  /// Quads of a bin that are looked up and tested together: of one primitive where tags are looked at twice.
-  unsigned end_of_part(const std::vector<Quad>& quads, unsigned from, unsigned total) const {
-    const unsigned most = std::min(total, from + at_once_);
-    if (!has_cache_ || !time_.z_cache.fetches_ahead()) return most;
+  /// Of the beats in which a bin moves at cycle; all but the last are full.
+  static unsigned quads_of_beat(const BinItem& item) {
+    const bool is_widest = item.beats == (item.quads + QuadBeat::capacity - 1) / QuadBeat::capacity;
+    return is_widest ? QuadBeat::capacity : std::max((item.quads + item.beats - 1) / item.beats, 1U);
+  }
+  /// Quads of a bin that are looked up and tested together: of one primitive and one beat where tags are looked at twice.
+  unsigned end_of_part(const std::vector<Quad>& quads, unsigned from, unsigned total, unsigned of_beat) const {
+    if (!has_cache_ || !time_.z_cache.fetches_ahead()) return std::min(total, from + at_once_);
+    const unsigned most = std::min({total, from + at_once_, (from / of_beat + 1) * of_beat});
     unsigned end = from + 1;
     while (end < most && primitive_order(quads[end]) == primitive_order(quads[from])) ++end;
     return end;
   }
-  unsigned count_parts(const std::vector<Quad>& quads, unsigned total) const {
+  unsigned count_parts(const std::vector<Quad>& quads, unsigned total, unsigned of_beat) const {
     unsigned parts = 0;
-    for (unsigned from = 0; from < total; ++parts) from = end_of_part(quads, from, total);
+    for (unsigned from = 0; from < total; ++parts) from = end_of_part(quads, from, total, of_beat);
     return parts;
   }
   /// Some of them end, in the cycle before this one; of the others' draws it is known as well that they last so long.

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include <vrpipe/kernel/accounting.h>
-#include <vrpipe/memory/cache_organization.h>
 #include <vrpipe/pipeline/framebuffer.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
@@ -23,22 +22,6 @@ class FunctionalRunAhead {
   /// Takes the survivors of a part of a bin, as soon as that is tested, through merging, shading and blending; with the
   /// last of a bin, `terminated` has what all of them newly terminate.
   virtual void tested(const QuadBeat& survivors, std::vector<TerminationSignal>& terminated) = 0;
-};
-
-/// The z-cache, of a ZROP with a memory port. Where that is not connected it holds everything, and nothing is moved.
-struct ZCache {
-  CacheOrganization organization{16384};  ///< of whole sectors for a quad, in lines of one screen tile
-  std::uint32_t mshrs = 384;              ///< sectors that are filled at a time
-  std::uint32_t input_quads = 4096;       ///< queue between look-up and test
-  std::uint32_t input_updates = 64;       ///< the same of updates, signals
-  std::uint32_t sectors_per_cycle = 16;   ///< filled or written back in a cycle in which nothing is tested or updated
-  bool fast_clear = true;                 ///< sectors that a clear has left as they are in memory are not read
-  std::uint32_t fetch_ahead_lines = 0;    ///< between two looks at tags, if there are two
-  /// Whether a line may go while it is fetched for a test.
-  bool fetches_ahead() const { return fetch_ahead_lines > 0; }
-  /// Throws UserError for one that cannot be: CacheOrganization::check; a sector holds a quad of the target, a line is of one
-  /// screen tile.
-  void check(DepthFormat format) const;
 };
 
 /// Slot `zrop`: depth and stencil test, before or after shading, termination test and update.

@@ -1,4 +1,4 @@
-#include <vrpipe/pipeline/slots/zrop.h>
+#include "zrop/z_cache.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,14 @@
 
 namespace vrpipe {
 
-void ZCache::check(DepthFormat format) const {
+ZCache::ZCache(const ZropParameters& parameters, DepthFormat format)
+    : organization(parameters.cache.organization()),
+      mshrs(parameters.mshrs),
+      input_quads(parameters.input_quads),
+      input_updates(parameters.input_updates),
+      sectors_per_cycle(parameters.sectors_per_cycle),
+      fast_clear(parameters.fast_clear),
+      fetch_ahead_lines(parameters.fetch_ahead_lines) {
   const std::uint32_t quad = DepthStencilSurface::bytes_per_quad(format);
   const std::uint32_t tile = positions_per_tile * quad;
   organization.check("z-cache", "zrop", "cache_bytes");
