@@ -217,8 +217,8 @@ class TimedZrop : public TimedUnit {
 
   /// Of the beats in which a bin moves at cycle; all but the last are full.
   static unsigned quads_of_beat(const BinItem& item) {
-    const bool is_widest = item.beats == (item.quads + QuadBeat::capacity - 1) / QuadBeat::capacity;
-    return is_widest ? QuadBeat::capacity : std::max((item.quads + item.beats - 1) / item.beats, 1U);
+    if (item.beats <= (item.quads + QuadBeat::capacity - 1) / QuadBeat::capacity) return QuadBeat::capacity;
+    return std::max((item.quads + item.beats - 1) / item.beats, 1U);
   }
   /// Quads of a bin that are looked up and tested together: of one primitive and one beat where tags are looked at twice.
   unsigned end_of_part(const std::vector<Quad>& quads, unsigned from, unsigned total, unsigned of_beat) const {

@@ -1,5 +1,6 @@
 // What ZROP was measured to take on a real GPU beyond its rate: blocks that quads touch, flits of the ROPs' port, lines that
 // come back.
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <vector>
@@ -138,11 +139,14 @@ class ZropPrices : public ::testing::TestWithParam<Fidelity> {
       Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 32);
       Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 8192);
       for (const Bin& bin : all) {
-        QuadBeat beat;
-        beat.tile = bin.tile;
-        for (const Quad& quad : bin.quads) beat.quads[beat.count++] = quad;
-        beat.last_of_bin = true;
-        in.add(beat);
+        for (std::size_t from = 0; from < bin.quads.size(); from += QuadBeat::capacity) {
+          QuadBeat beat;
+          beat.tile = bin.tile;
+          beat.count = static_cast<std::uint8_t>(std::min<std::size_t>(QuadBeat::capacity, bin.quads.size() - from));
+          std::copy_n(bin.quads.begin() + static_cast<std::ptrdiff_t>(from), beat.count, beat.quads.begin());
+          beat.last_of_bin = from + beat.count == bin.quads.size();
+          in.add(beat);
+        }
       }
       bench.run();
       last = out.records().back().cycle;
@@ -257,6 +261,26 @@ TEST_P(ZropPrices, AheadOfItsDataMoreLinesAreUnderWayThanTheCacheHolds) {
   EXPECT_LT(run(bins, small_cache, true, 1000), 1000U + 128 * 2 + 50);
   EXPECT_EQ(reads, 128U);
   EXPECT_GT(run(bins, pinned, true, 1000), 3 * 1000U) << "32 lines at a time";
+}
+
+TEST_P(ZropPrices, AheadOfItsDataACycleHasTheQuadsOfOnePrimitiveInOneBeat) {
+  Bench::Settings wide = small_cache;
+  wide.push_back({"quads_per_cycle", "16"});
+  const auto cycles_of = [&](const std::vector<unsigned>& quads_of_primitives) {
+    std::uint32_t primitive = 0;
+    const auto make = [&](unsigned) {
+      Bin bin{{0, 0}, {}};
+      for (const unsigned quads : quads_of_primitives) {
+        for (unsigned i = 0; i < quads; ++i) bin.quads.push_back(quad_at(i, primitive));
+        ++primitive;
+      }
+      return bin;
+    };
+    return cycles_of_a_bin(make, wide, true);
+  };
+  EXPECT_NEAR(cycles_of({16}), 1, 0.01);
+  EXPECT_NEAR(cycles_of({8, 8}), 2, 0.01);
+  EXPECT_NEAR(cycles_of({12, 12}), 3, 0.01) << "12, 4 and 8 quads";
 }
 
 TEST_P(ZropPrices, LinesThatComeBackTakeTrips) {

@@ -502,13 +502,10 @@ TEST_F(ZCacheTest, WhatMakesNoCacheIsRefusedWhenTheUnitIsMade) {
   refused({{"ways", "256"}}, "zrop.ways, zrop.cache_bytes");
   refused({{"ways", "48"}}, "zrop.ways, zrop.cache_bytes");
   refused({{"line_bytes", "64"}, {"sector_bytes", "128"}}, "zrop.sector_bytes, zrop.line_bytes");
-  ZCache z_cache;
-  z_cache.organization.line_bytes = 2048;
-  z_cache.organization.sector_bytes = 64;
-  EXPECT_THROW(z_cache.check(DepthFormat::d24), UserError) << "of two screen tiles";
-  z_cache.organization.line_bytes = 128;
-  z_cache.organization.sector_bytes = 8;
-  EXPECT_THROW(z_cache.check(DepthFormat::d24), UserError) << "of half a quad";
+  ZropParameters parameters;
+  parameters.set("zrop", "sector_bytes", "16");
+  EXPECT_NO_THROW(ZCache(parameters, DepthFormat::d24));
+  EXPECT_THROW(ZCache(parameters, DepthFormat::d32f), UserError) << "of half a quad";
 }
 
 /// At lt a bin waits for its fills as its beats do at cycle.
