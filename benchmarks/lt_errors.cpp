@@ -1,9 +1,9 @@
 // How far lt is off cycle over random configurations of every platform, and how good its own word about that is.
-//   lt_errors [--seed N] [--count N] [--short] [--worst N] [--only N]
+//   lt_errors [--seed N] [--count N] [--short] [--worst N] [--only N] [--at-cycle UNIT,...|any]
 // A configuration is a platform, a variant, a format, a termination, and three to five parameters of units and links that the
 // platform has, each log-uniform in its range, 7 in 10 of them within 16 times the platform's value; it draws a window of the
 // measured draw of the tests or of a built-in scene. What is refused, and what takes a minute, is left out. `--only` does one
-// of them, then with each of its parameters alone.
+// of them, then with each of its parameters alone. `--at-cycle` has units at cycle among others at lt, or another one in each run.
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -18,9 +18,11 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <boost/algorithm/string/replace.hpp>
 
 #include <vrpipe/arithmetic/random.h>
 #include <vrpipe/component/error.h>
+#include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/draw_list.h>
 #include <vrpipe/workloads/scene.h>
@@ -83,11 +85,12 @@ std::string value_of(Dice& dice, const Parameter& parameter) {
 }
 
 struct Case {
-  RunRequest request;
+  RunRequest request;  ///< of lt
   const Scene* scene;
 };
 
-Case draw_case(std::uint64_t seed, std::uint64_t index, const std::vector<Scene>& scenes) {
+/// @param at_cycle  units; "any" for one that is drawn
+Case draw_case(std::uint64_t seed, std::uint64_t index, const std::vector<Scene>& scenes, const std::string& at_cycle) {
   Dice dice(mix(mix(seed) ^ index));
   Case c;
   c.scene = &dice.one_of(scenes);
@@ -108,6 +111,13 @@ Case draw_case(std::uint64_t seed, std::uint64_t index, const std::vector<Scene>
     const auto& [unit, parameter] = dice.one_of(all);
     c.request.settings.push_back({unit, parameter->name(), value_of(dice, *parameter)});
   }
+  std::vector<std::string> units;
+  for (const Instance& instance : netlist.instances()) {
+    if (!Netlist::is_memory(instance)) units.push_back(instance.slot);
+  }
+  choose_fidelity(c.request,
+                  "lt" +
+                      (at_cycle.empty() ? "" : "," + (at_cycle == "any" ? dice.one_of(units) : at_cycle) + "=cycle"));
   return c;
 }
 
@@ -115,6 +125,7 @@ std::string describe(const Case& c) {
   std::string text =
       fmt::format("{} {} {} {} {}", c.scene->name, c.request.platform->name, c.request.variant.name,
                   name_of(c.request.format), c.request.termination == Termination::strict ? "strict" : "paper");
+  if (!c.request.units_at_cycle.empty()) text += " " + fidelity_of(c.request);
   for (const Setting& setting : c.request.settings)
     text += fmt::format(" {}.{}={}", setting.unit, setting.parameter, setting.value);
   return text;
@@ -188,7 +199,8 @@ struct Found {
   std::uint64_t index;
 };
 
-void print_summary(std::uint64_t seed, const std::vector<Scene>& scenes, std::vector<Found> found, std::size_t worst) {
+void print_summary(std::uint64_t seed, const std::vector<Scene>& scenes, const std::string& at_cycle,
+                   std::vector<Found> found, std::size_t worst) {
   std::vector<double> all, said, unsaid;
   std::size_t within = 0;
   for (const Found& each : found) {
@@ -209,11 +221,12 @@ void print_summary(std::uint64_t seed, const std::vector<Scene>& scenes, std::ve
   for (std::size_t i = 0; i < std::min(worst, found.size()); ++i)
     std::printf("%+8.2f  --only %llu  %s\n", found[i].measured.error_percent,
                 static_cast<unsigned long long>(found[i].index),
-                describe(draw_case(seed, found[i].index, scenes)).c_str());
+                describe(draw_case(seed, found[i].index, scenes, at_cycle)).c_str());
 }
 
 int measure_all(int argc, char** argv) {
   std::uint64_t seed = 1, count = 2000;
+  std::string at_cycle;
   std::size_t worst = 20;
   std::optional<std::uint64_t> only;
   bool is_short = false;
@@ -228,19 +241,23 @@ int measure_all(int argc, char** argv) {
       worst = number();
     } else if (option == "--only") {
       only = number();
+    } else if (option == "--at-cycle" && i + 1 < argc) {
+      at_cycle = argv[++i];
+      boost::replace_all(at_cycle, ",", "=cycle,");
     } else if (option == "--short") {
       is_short = true;
     } else {
       const bool help = option == "--help";
-      std::fprintf(help ? stdout : stderr,
-                   "usage: lt_errors [--seed N] [--count N] [--worst N] [--only N] [--short]\n");
+      std::fprintf(
+          help ? stdout : stderr,
+          "usage: lt_errors [--seed N] [--count N] [--worst N] [--only N] [--at-cycle UNIT,...|any] [--short]\n");
       return help ? 0 : 2;
     }
   }
   if (is_short) count = 12;
   const std::vector<Scene> scenes = load_scenes(is_short);
   if (only) {
-    Case c = draw_case(seed, *only, scenes);
+    Case c = draw_case(seed, *only, scenes, at_cycle);
     print_one(c);
     for (const Setting& setting : std::vector<Setting>(c.request.settings)) {
       c.request.settings = {setting};
@@ -251,9 +268,9 @@ int measure_all(int argc, char** argv) {
   std::printf("seed %llu\n", static_cast<unsigned long long>(seed));
   std::vector<Found> found;
   for (std::uint64_t index = 0; index < count; ++index) {
-    if (const auto measured = measure(draw_case(seed, index, scenes))) found.push_back({*measured, index});
+    if (const auto measured = measure(draw_case(seed, index, scenes, at_cycle))) found.push_back({*measured, index});
   }
-  print_summary(seed, scenes, std::move(found), worst);
+  print_summary(seed, scenes, at_cycle, std::move(found), worst);
   return 0;
 }
 

@@ -7,6 +7,7 @@
 
 #include <vrpipe/arithmetic/lanes.h>
 #include <vrpipe/component/error.h>
+#include <vrpipe/kernel/local_clock.h>
 
 namespace vrpipe {
 
@@ -37,10 +38,35 @@ ClockDomain::ClockDomain(const sc_core::sc_module_name& name, std::uint64_t peri
     : sc_module(name),
       period_(static_cast<double>(period_ps), sc_core::SC_PS),
       period_value_(period_.value()),
-      due_(cycles_per_vector, never) {
+      due_(cycles_per_vector, never),
+      global_(this) {
   SC_METHOD(edge);
   sensitive << event_;
   dont_initialize();
+}
+
+ClockDomain::ClockDomain(const sc_core::sc_module_name& name, ClockDomain& global)
+    : sc_module(name),
+      period_(global.period_),
+      period_value_(period_.value()),
+      due_(cycles_per_vector, never),
+      global_(&global) {}
+
+ClockDomain::~ClockDomain() = default;
+
+/// Lets the earliest edge of the local clocks come, or what they do at rest; false if there is nothing.
+bool ClockDomain::step_locals() {
+  const auto earliest = std::min_element(locals_.begin(), locals_.end(), [](const LocalClock* a, const LocalClock* b) {
+    return a->next_edge() < b->next_edge();
+  });
+  if (earliest == locals_.end()) return false;
+  const bool stepped = std::exchange(steps_locals_, true);
+  const Cycle next = (*earliest)->next_edge();
+  if (next != never) (*earliest)->advance(next + 1);
+  const bool any =
+      next != never || std::any_of(locals_.begin(), locals_.end(), [](LocalClock* local) { return local->rouse(); });
+  steps_locals_ = stepped;
+  return any;
 }
 
 unsigned ClockDomain::attach(Clocked& unit) {
@@ -124,7 +150,8 @@ void ClockDomain::edge() {
         cycle = ticked ? cycle + 1 : *std::min_element(due_.begin(), due_.end());
       }
     }
-    next_ = *std::min_element(due_.begin(), due_.end());
+    do next_ = *std::min_element(due_.begin(), due_.end());
+    while (next_ == never && step_locals());
     if (next_ <= now_) throw SimulationFault(name(), now_, "a unit was woken for an edge in the past");
     if (next_ != never && next_ >= stop_at_) stopped_ = finished_ = true;
   } catch (...) {

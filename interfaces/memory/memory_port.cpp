@@ -23,7 +23,7 @@ namespace {
 /// What a socket is bound to, if it works in the cycles of this clock; null otherwise.
 ClockedMemory* memory_of_clock(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock) {
   auto* const memory = dynamic_cast<ClockedMemory*>(socket.operator->());
-  return memory != nullptr && &memory->clock() == &clock ? memory : nullptr;
+  return memory != nullptr && &memory->clock() == &clock.global() ? memory : nullptr;
 }
 
 }  // namespace
@@ -97,14 +97,16 @@ void MemoryPort::send(const MemoryRequest& request, std::uint32_t tag) {
   access.set_response_status(tlm::TLM_INCOMPLETE_RESPONSE);
 
   tlm::tlm_phase phase = tlm::BEGIN_REQ;
-  sc_core::sc_time delay = sc_core::SC_ZERO_TIME;
+  // Of a local clock the present is ahead of the kernel's: it is told as if the call were annotated with it.
+  const sc_core::sc_time lead = sc_core::sc_time::from_value(clock_.domain->lead() * clock_.domain->period().value());
+  sc_core::sc_time delay = lead;
   requesting_ = &access;  // until the memory says otherwise, perhaps from within the call
   requesting_until_ = never;
   const tlm::tlm_sync_enum status = socket->nb_transport_fw(access, phase, delay);
   if (status != tlm::TLM_ACCEPTED) requesting_ = nullptr;
   if (requesting_ == nullptr) requesting_until_ = 0;  // it ended from within the call
   if (status == tlm::TLM_COMPLETED || (status == tlm::TLM_UPDATED && phase == tlm::BEGIN_RESP)) {
-    answer(access, delay);
+    answer(access, delay - lead);
     if (status == tlm::TLM_UPDATED) {
       phase = tlm::END_RESP;
       socket->nb_transport_fw(access, phase, delay);

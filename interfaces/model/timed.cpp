@@ -27,6 +27,8 @@ void register_timed_unit_maker(const std::string& slot, UnitMaker maker) {
       {"slot " + slot + " has a module for lt already", "write a behaviour for the slot instead"});
 }
 
+bool has_timed_unit_maker(const std::string& slot) { return timed_makers().count(slot) > 0; }
+
 const UnitMaker& timed_unit_maker(const std::string& slot) {
   const auto found = timed_makers().find(slot);
   if (found == timed_makers().end()) throw SimulationFault("registry", 0, "slot " + slot + " has no module for lt");

@@ -45,6 +45,7 @@ class CropUnit : public Unit {
     out_done_.set_pipeline(time_.latency_cycles - 1);
     out_done_.set_optional();
     in_reads_.set_optional();
+    in_reads_.set_comes_ahead();
   }
 
   bool idle() const override {

@@ -38,6 +38,7 @@ class InShaderUnit : public Unit {
                 {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {
     out_done_.set_optional();
     in_reads_.set_optional();
+    in_reads_.set_comes_ahead();
   }
 
   bool idle() const override { return in_.empty() && in_reads_.empty() && warps_in_ == 0 && done_marks_.empty(); }

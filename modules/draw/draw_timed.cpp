@@ -66,6 +66,7 @@ class TimedDraw : public TimedUnit {
     }
     turn_ = (turn_ + 1) % outs_.size();
     last_ = &out;
+    clock.domain->wait_until([this] { return awaited_ == 0; });
     if (awaited_ > 0) throw SimulationFault(name(), taken, "CROP has not passed a mark that is a barrier");
     return std::max({due(), out.last() + 1, now + 1});
   }

@@ -21,6 +21,7 @@ class DrawUnit : public Unit {
       outs_.push_back(std::make_unique<StreamOut<VertexWarp>>(*this, "out_vertices_" + std::to_string(gpc)));
       in_done_.push_back(std::make_unique<StreamIn<BlendsDone>>(*this, "in_done_" + std::to_string(gpc)));
       in_done_.back()->set_optional();
+      in_done_.back()->set_answers();
     }
     have_ = behaviour_->next(warp_);
   }

@@ -41,7 +41,9 @@ class TimedProp : public TimedUnit {
                  }),
         in_late_(*this, "in_late",
                  [this](const ShadedWarpItem& item, CycleInterval visible) {
-                   return take_back(*item.warp, visible.first);
+                   const Cycle taken = take_back(*item.warp, visible.first);
+                   if (!is_leaving_) leave_beside_late();
+                   return taken;
                  }),
         in_shaded_(*this, "in_shaded",
                    [this](const ShadedWarpItem& item, CycleInterval visible) {
@@ -176,19 +178,19 @@ class TimedProp : public TimedUnit {
   bool is_late(const ShadedWarp& warp) const { return warp.count > 0 && plan_.is_late(warp.draw[0]); }
   /// In a frame with late tests: either way.
   [[gnu::noinline]] void leave_beside_late() {
-    bool left = true;
-    while (left) {
-      if (in_turn_.warp == nullptr && order_.has_next()) in_turn_ = order_.take();
-      const bool is_mark = in_turn_.warp == nullptr;
-      const ReorderBuffer::Waiting* const next = is_mark ? order_.next_mark() : &in_turn_;
-      if (next == nullptr) return;
-      const bool goes_late = is_mark ? plan_.waits_at(next->warp->mark) : is_late(*next->warp);
-      if (goes_late) {
-        send_late(*next, is_mark);
-      } else {
-        left = leave_behind_late(is_mark);
-      }
-    }
+    is_leaving_ = true;
+    while (leave_one_beside_late()) continue;
+    is_leaving_ = false;
+  }
+  bool leave_one_beside_late() {
+    if (in_turn_.warp == nullptr && order_.has_next()) in_turn_ = order_.take();
+    const bool is_mark = in_turn_.warp == nullptr;
+    const ReorderBuffer::Waiting* const next = is_mark ? order_.next_mark() : &in_turn_;
+    if (next == nullptr) return false;
+    const bool goes_late = is_mark ? plan_.waits_at(next->warp->mark) : is_late(*next->warp);
+    if (!goes_late) return leave_behind_late(is_mark);
+    send_late(*next, is_mark);
+    return true;
   }
   void send_late(const ReorderBuffer::Waiting next, bool is_mark) {
     const unsigned quads = next.warp->count;
@@ -243,6 +245,7 @@ class TimedProp : public TimedUnit {
   IssuePort late_;
   ReorderBuffer::Waiting in_turn_;  ///< the warp whose turn it is to go either way; none without a warp
   unsigned on_late_way_ = 0;        ///< warps and marks that were sent to be tested late and are not back
+  bool is_leaving_ = false;         ///< while what is in turn is sent, when it may come back at once
 };
 
 [[maybe_unused]] const bool prop_timed_registered = [] {

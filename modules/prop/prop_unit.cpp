@@ -46,6 +46,10 @@ class PropUnit : public Unit {
     out_late_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
     out_late_.set_optional();
     in_late_.set_optional();
+    in_bins_.set_passes_to(tests_ ? out_test_ : out_survivors_, 0);
+    if (tests_) in_tested_.set_passes_to(out_survivors_, 0);
+    in_shaded_.set_comes_ahead();
+    in_late_.set_comes_ahead();
   }
 
   bool idle() const override {

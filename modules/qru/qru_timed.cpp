@@ -79,10 +79,12 @@ class TimedQru : public TimedUnit {
       }
     }
     charge(UnitState::busy, left_ + 1);
-    go_to(visible.last);
-    while (behaviour_->finish_bin(warp_)) {
-      numbering_.number(warp_);
-      launch(warp_);
+    if (item.last_part) {
+      go_to(visible.last);
+      while (behaviour_->finish_bin(warp_)) {
+        numbering_.number(warp_);
+        launch(warp_);
+      }
     }
     item.storage->in_use = false;
     return {begin, std::max(left_, begin)};

@@ -51,6 +51,7 @@ class TimedRaster : public TimedUnit {
     return visible;
   }
   void apply_updates(Cycle until) {
+    if (until != never) in_hi_z_.ask(until);
     for (; !updates_.empty() && updates_.front().at <= until; updates_.pop()) {
       behaviour_->update(updates_.front().update);
     }
@@ -67,6 +68,7 @@ class TimedRaster : public TimedUnit {
       // It comes back meanwhile.
       const Cycle sent = out_.send(mark, now_).first;
       now_ = std::max(now_, sent);
+      clock.domain->wait_until([this] { return !holds_; });
       if (holds_) throw SimulationFault(name(), now_, "ZROP has not passed a mark that Hi-Z waits for");
       return sent;
     }

@@ -22,6 +22,7 @@ class RasterUnit : public Unit {
         time_(behaviour_->time()) {
     out_.set_pipeline(time_.setup_latency_cycles - 1, time_.fine_tiles_per_cycle);
     in_hi_z_.set_optional();
+    in_hi_z_.set_answers();
   }
 
   bool idle() const override { return in_.empty() && in_hi_z_.empty() && !active_ && at_ == tile_.count; }

@@ -108,6 +108,9 @@ class SmUnit : public Unit {
         fragment_(*context.frame, [&](FragmentShader shader, bool merges) { return program(shader, merges); }),
         wheel_(horizon()),
         schedulers_(time_.schedulers()) {
+    in_vertices_.set_passes_to(out_vertices_, time_.vertex_warps);
+    in_warps_.set_follows(out_vertices_);
+    in_release_.set_answers();
     if (!EffectGate(context, "cache.details").is_active()) l1_statistics_.leave_out_details();
     fragment_slots_ = time_.fragment_slots();
     free_slots_ = fragment_slots_;

@@ -172,7 +172,7 @@ class TimedZrop : public TimedUnit {
     for (unsigned part = 0, from = 0, end = 0; part < parts; ++part, from = end) {
       end = end_of_part(quads, from, total, of_beat);
       beat.count = static_cast<std::uint8_t>(end - from);
-      beat.last_of_bin = part + 1 == parts;
+      beat.last_of_bin = item.last_part && part + 1 == parts;
       std::copy_n(quads.begin() + from, beat.count, beat.quads.begin());
       Cycle ready = visible.of_part(part, parts);
       if (has_cache_) ready = look_up(beat, ready, needs_stencil, looked_up);
@@ -207,6 +207,10 @@ class TimedZrop : public TimedUnit {
       charge(UnitState::memory, tested.first);
     }
     charge(UnitState::starved, tested.first);
+    if (item.beats == 0 && !item.last_part) {
+      item.storage->in_use = false;
+      return has_cache_ ? looked_up : tested;
+    }
     const CycleInterval taken = out_.send(item, left, item.beats);
     charge(UnitState::busy, tested.last + 1);
     charge(UnitState::blocked, taken.last);
@@ -257,6 +261,7 @@ class TimedZrop : public TimedUnit {
     holds_ = true;
     const Cycle taken = out_.send(mark, at).first;
     tests_.hold(taken);
+    clock.domain->wait_until([this] { return !holds_; });
     if (holds_) throw SimulationFault(name(), taken, "a mark has not come around");
     return {at, taken};
   }
@@ -315,10 +320,14 @@ class TimedZrop : public TimedUnit {
     if (!late_.empty()) make_way(visible);
     if (has_cache_) move_sectors(visible);
     Cycle at = tests_.take(visible, quads);
+    in_terminations_.ask(at);
     if (has_cache_) foresee_updates(at);
     while (!pending_.empty() && pending_.front().at <= at) {
       // One z-cache port: a cycle with updates tests nothing.
-      if (pending_.front().at == at) at = tests_.take(at + 1, quads);
+      if (pending_.front().at == at) {
+        at = tests_.take(at + 1, quads);
+        in_terminations_.ask(at);
+      }
       apply_update();
     }
     return at;
@@ -327,6 +336,7 @@ class TimedZrop : public TimedUnit {
   /// When a part of a bin can be tested; extends the cycles of its bin's look-ups.
   Cycle look_up(const QuadBeat& beat, Cycle visible, bool needs_stencil, CycleInterval& looked_up) {
     const Cycle turn = z_.turn(beat.count, visible);
+    in_terminations_.ask(turn);
     look_up_updates(turn);
     const TimedZCache::Times times = z_.look_up(beat, turn, needs_stencil);
     note_moves();

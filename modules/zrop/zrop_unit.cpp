@@ -48,6 +48,8 @@ class ZropUnit : public Unit {
     out_late_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
     out_late_.set_optional();
     in_late_.set_optional();
+    in_late_.set_comes_ahead();
+    in_terminations_.set_answers();
     out_reads_.set_pipeline(0, 2 * QuadBeat::capacity);
     out_reads_.set_optional();
   }

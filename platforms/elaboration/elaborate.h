@@ -22,8 +22,9 @@ inline sc_core::sc_module* module_of(Component& unit) { return dynamic_cast<sc_c
 /// Connects the units of a netlist, or of a part of it, and stubs what is to be. `find` gives the Component* of a path;
 /// null for one that is not there, whose links are left out.
 /// @param observers  null for none
-template <class Find>
-void connect_units(const Netlist& netlist, Observers* observers, Find&& find) {
+/// @param connect    (link, sender, out, receiver, in, options) connects two ends
+template <class Find, class Connect>
+void connect_units(const Netlist& netlist, Observers* observers, Find&& find, Connect&& connect) {
   for (const Link& link : netlist.links()) {
     const auto [from, out] = split_port(link.from);
     const auto [to, in] = split_port(link.to);
@@ -33,7 +34,7 @@ void connect_units(const Netlist& netlist, Observers* observers, Find&& find) {
     LinkOptions options{link.parameters->depth, link.parameters->latency_cycles, link.parameters->items_per_cycle};
     if (observers != nullptr) options.observers = observers->of_link(link.name());
     const ModuleScope scope(module_of(*sender));
-    sender->out(out).connect(receiver->in(in), options);
+    connect(link, *sender, sender->out(out), *receiver, receiver->in(in), options);
   }
   for (const std::string& port : netlist.stubs()) {
     const auto [path, name] = split_port(port);
@@ -46,6 +47,14 @@ void connect_units(const Netlist& netlist, Observers* observers, Find&& find) {
       unit->in(name).stub();
     }
   }
+}
+
+template <class Find>
+void connect_units(const Netlist& netlist, Observers* observers, Find&& find) {
+  connect_units(netlist, observers, find,
+                [](const Link&, Component&, OutPort& out, Component&, InPort& in, const LinkOptions& options) {
+                  out.connect(in, options);
+                });
 }
 
 /// Throws UserError for a memory that cannot do without another one below, and has none.

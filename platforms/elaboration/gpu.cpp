@@ -11,6 +11,7 @@
 
 #include <vrpipe/arithmetic/random.h>
 #include <vrpipe/component/error.h>
+#include <vrpipe/model/border.h>
 #include <vrpipe/model/timed.h>
 #include <vrpipe/pipeline/checked_behaviours.h>
 #include <vrpipe/pipeline/slots/memory.h>
@@ -94,8 +95,16 @@ Gpu::Gpu(const Configuration& configuration, Framebuffer& framebuffer)
   const bool observes_links =
       observers != nullptr && std::any_of(netlist.links().begin(), netlist.links().end(),
                                           [&](const Link& link) { return observers->observes_link(link.name()); });
-  connect_units(netlist, observes_links && sockets.enter() ? observers : nullptr,
-                [&](const std::string& path) { return find(path); });
+  connect_units(
+      netlist, observes_links && sockets.enter() ? observers : nullptr,
+      [&](const std::string& path) { return find(path); },
+      [&](const Link& link, Component& sender, OutPort& out, Component& receiver, InPort& in,
+          const LinkOptions& options) {
+        Border* const from = border_of(split_port(link.from).first);
+        Border* const to = border_of(split_port(link.to).first);
+        if (from == nullptr && to == nullptr) return out.connect(in, options);
+        connect_across_borders({from, sender, out, to, receiver, in}, options);
+      });
   add_memories();
   check();
 }
@@ -107,6 +116,11 @@ Unit* Gpu::find(const std::string& path) const {
     if (placed.instance->path == path) return placed.unit.get();
   }
   return nullptr;
+}
+
+Border* Gpu::border_of(const std::string& path) const {
+  const auto found = borders_.find(path);
+  return found == borders_.end() ? nullptr : found->second.get();
 }
 
 void Gpu::add(const Instance& instance, Framebuffer& framebuffer) {
@@ -125,16 +139,22 @@ void Gpu::add(const Instance& instance, Framebuffer& framebuffer) {
       behaviour = ahead->second->repeat_late_tests(std::move(behaviour));
     }
   }
-  follow_clock(*counting, *clock_);
   behaviour->use_surfaces(framebuffer);
   if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get()); zrop != nullptr && ahead != ahead_.end()) {
     zrop->follow(*ahead->second);
   }
   const unsigned gpcs = configuration_.netlist().gpcs();
-  const Fidelity fidelity = configuration_.request().fidelity;
-  const UnitMaker& make = fidelity == Fidelity::cycle ? unit_maker(slot) : timed_unit_maker(slot);
+  const bool is_at_cycle = configuration_.is_at_cycle(instance);
+  const UnitMaker& make = is_at_cycle ? unit_maker(slot) : timed_unit_maker(slot);
   const Hierarchy::Place place = hierarchy_->place_of(instance.path);
-  std::unique_ptr<Unit> unit = make(place.name, *clock_, std::move(behaviour), context, gpcs);
+  ClockDomain* clock = clock_.get();
+  if (is_at_cycle && configuration_.request().fidelity != Fidelity::cycle) {
+    std::unique_ptr<Border>& border = borders_[instance.path];
+    border = std::make_unique<Border>((place.name + "_clock").c_str(), *clock_);
+    clock = border.get();
+  }
+  follow_clock(*counting, *clock);
+  std::unique_ptr<Unit> unit = make(place.name, *clock, std::move(behaviour), context, gpcs);
   if (Observers* const observers = configuration_.request().observers.get()) {
     if (StateObserver* const states = observers->of_unit(instance.path)) unit->observe_states(*states);
   }
@@ -262,6 +282,7 @@ Cycle Gpu::run(std::atomic<float>* progress) {
     }
     for (OutPort* port : placed.unit->out_ports) port->stall_randomly(mix(++seed), request.stall_per_256);
   }
+  for (const auto& [path, border] : borders_) border->open();
   if (request.tick_order_seed != 0) {
     std::vector<unsigned> order(clock_->attached());
     std::iota(order.begin(), order.end(), 0U);

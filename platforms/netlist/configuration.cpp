@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/model/timed.h>
 #include <vrpipe/pipeline/checked_behaviours.h>
 #include <vrpipe/pipeline/slots/wdx.h>
 #include <vrpipe/platforms/observers.h>
@@ -104,6 +105,7 @@ Configuration::Configuration(const RunRequest& request, const Frame& frame)
   }
   wire();
   choose_implementations();
+  check_units_at_cycle();
   for (const Setting& setting : request.platform->settings) {
     if (concerns_chosen_unit(setting)) apply(setting);
   }
@@ -241,6 +243,47 @@ void Configuration::choose_implementations() {
     unit.real_parameters = unit.real->make_parameters();
     unit.chosen_parameters = unit.chosen->make_parameters();
   }
+}
+
+void Configuration::check_units_at_cycle() const {
+  if (request_.fidelity != Fidelity::lt) return;
+  for (const std::string& name : request_.units_at_cycle) {
+    const std::string where = "--fidelity lt," + name + "=cycle";
+    const std::vector<const Instance*> named = instances_named(name);
+    if (!named.empty() && netlist_.gpcs() > 1 && (named.front()->slot == "sm" || named.front()->slot == "vpo")) {
+      throw UserError(
+          "cannot simulate " + name + " at a fidelity of its own", where,
+          fmt::format("the primitives of {} GPCs meet behind it in draw order, which at lt is that of the calls",
+                      netlist_.gpcs()),
+          "take --fidelity cycle, or one GPC: --set platform.gpcs=1");
+    }
+    if (!named.empty() && !netlist_.foreign_memories().empty()) {
+      throw UserError("cannot simulate " + name + " at a fidelity of its own", where,
+                      "it would be ahead of the time that the platform's memory has of its own",
+                      "take one fidelity for all units");
+    }
+    if (!named.empty() && !Netlist::is_memory(*named.front())) continue;
+    std::vector<std::string> known;
+    for (const Instance& instance : netlist_.instances()) {
+      if (Netlist::is_memory(instance)) continue;
+      known.push_back(instance.slot);
+      known.push_back(instance.path);
+    }
+    if (!named.empty()) {
+      throw UserError("cannot simulate " + name + " at a fidelity of its own", where, "a memory's is that of the run",
+                      "take --fidelity cycle, or a unit: " + known.front());
+    }
+    throw UserError("unknown unit '" + name + "'", where, "platform " + request_.platform->name + " has none",
+                    "did you mean " + nearest_name(name, known) + "? `vrpipe units` lists all");
+  }
+}
+
+bool Configuration::is_at_cycle(const Instance& instance) const {
+  const std::vector<std::string>& names = request_.units_at_cycle;
+  if (request_.fidelity != Fidelity::lt) return request_.fidelity == Fidelity::cycle;
+  if (!has_timed_unit_maker(instance.slot)) return true;
+  return std::any_of(names.begin(), names.end(),
+                     [&](const std::string& name) { return name == instance.slot || names_path(name, instance.path); });
 }
 
 std::vector<const Instance*> Configuration::instances_named(const std::string& name) const {

@@ -13,6 +13,8 @@
 #include "run/statistics.h"
 
 #include <fmt/format.h>
+#include <boost/algorithm/string/classification.hpp>
+#include <boost/algorithm/string/split.hpp>
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/component/names.h>
@@ -50,6 +52,28 @@ Fidelity fidelity_named(const std::string& name) {
   }
   throw UserError("unknown fidelity '" + name + "'", "--fidelity", "this build has no such fidelity",
                   fmt::format("did you mean {}? There are {}", nearest_name(name, names), fmt::join(names, ", ")));
+}
+
+void choose_fidelity(RunRequest& request, const std::string& text) {
+  std::vector<std::string> words;
+  boost::split(words, text, boost::is_any_of(","));
+  request.fidelity = fidelity_named(words.front());
+  request.units_at_cycle.clear();
+  for (auto word = words.begin() + 1; word != words.end(); ++word) {
+    const std::size_t sign = word->find('=');
+    if (request.fidelity != Fidelity::lt || sign == std::string::npos || word->substr(sign + 1) != "cycle") {
+      throw UserError("unknown fidelity of a unit '" + *word + "'", "--fidelity " + text,
+                      "units can be at cycle among others at lt", "write UNIT=cycle behind lt, as in lt,crop=cycle");
+    }
+    request.units_at_cycle.push_back(word->substr(0, sign));
+  }
+}
+
+std::string fidelity_of(const RunRequest& request) {
+  std::string text = name_of(request.fidelity);
+  if (request.fidelity != Fidelity::lt || !request.variant.is_of_pipeline()) return text;
+  for (const std::string& unit : request.units_at_cycle) text += "," + unit + "=cycle";
+  return text;
 }
 
 namespace {

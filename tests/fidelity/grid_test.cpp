@@ -14,10 +14,6 @@ using namespace testing;
 
 constexpr double most_percent = 2.5;
 
-double percent_above(std::uint64_t value, std::uint64_t reference) {
-  return 100 * (static_cast<double>(value) / static_cast<double>(reference) - 1);
-}
-
 std::string name_in_grid(const RunRequest& request) {
   return request.platform->name + " " + name_of(request.format) + " " + name_of(request.termination) + " " +
          request.variant.name;

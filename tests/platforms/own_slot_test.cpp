@@ -134,6 +134,15 @@ class SieveUnit : public Unit {
 };
 
 const SlotRegistrar slot({"sieve", 46, "sieve"}, {{"beat_cycles", 1, 100}});
+const SlotRegistrar clocked_slot({"clocked-sieve", 47, "sieve"}, {{"beat_cycles", 1, 100}});
+const Registrar<Sieve, Behaviour> clocked_sieve("clocked-sieve", "sieve", "has no timing model of lt");
+[[maybe_unused]] const bool clocked_sieve_registered = [] {
+  register_unit_maker("clocked-sieve", [](const std::string& name, ClockDomain& domain,
+                                          std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned) {
+    return std::make_unique<SieveUnit>(name.c_str(), domain, behaviour_as<Sieve>(std::move(behaviour)));
+  });
+  return true;
+}();
 const Registrar<Sieve, Behaviour> sieve("sieve", "sieve", "takes every third quad away");
 [[maybe_unused]] const bool sieve_registered = [] {
   register_untimed_unit_maker("sieve", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
@@ -151,15 +160,17 @@ const Registrar<Sieve, Behaviour> sieve("sieve", "sieve", "takes every third qua
   return true;
 }();
 
-RunResult sieved(Fidelity fidelity, std::vector<Setting> settings = {}) {
-  static const Platform platform = testing::edited("agx-orin-ideal-memory", [](Netlist& netlist) {
-    netlist.insert("gpc0.raster.out_quads", "gpc0.sieve", "sieve", "in_quads", "out_quads");
+RunResult sieved(Fidelity fidelity, std::vector<Setting> settings = {}, const std::string& in_slot = "sieve",
+                 std::vector<std::string> units_at_cycle = {}) {
+  const Platform platform = testing::edited("agx-orin-ideal-memory", [&](Netlist& netlist) {
+    netlist.insert("gpc0.raster.out_quads", "gpc0.sieve", in_slot, "in_quads", "out_quads");
   });
   static const Draw draw = testing::random_draw(96, 96, 2000, 3);
   RunRequest request = testing::request_of("baseline", fidelity, [&](RunRequest& r) {
     r.platform = &platform;
     r.termination = Termination::strict;  // no time-out: the bound counts what the slot's place in the draw allows
     r.settings = std::move(settings);
+    r.units_at_cycle = std::move(units_at_cycle);
   });
   return testing::run(request, draw);
 }
@@ -191,6 +202,17 @@ TEST(OwnSlot, IsInTheBoundInOccupancyAndInTheAccountOfCycles) {
     EXPECT_LE(off, fidelity == Fidelity::bound ? 0 : 0.01) << name_of(fidelity);
     EXPECT_GE(off, -0.02) << name_of(fidelity);
   }
+}
+
+TEST(OwnSlot, CanBeAtCycleAmongOthersAtLt) {
+  const std::vector<Setting> slow{{"gpc0.sieve", "beat_cycles", "7"}};
+  const RunResult exact = sieved(Fidelity::cycle, slow);
+  const RunResult asked = sieved(Fidelity::lt, slow, "sieve", {"sieve"});
+  EXPECT_EQ(asked.counts.quads_terminated, asked.counts.quads_rasterized / 3);
+  EXPECT_NEAR(static_cast<double>(*asked.cycles) / static_cast<double>(*exact.cycles), 1, 0.01);
+  // One without a timing model of lt is.
+  const RunResult alone = sieved(Fidelity::lt, slow, "clocked-sieve");
+  EXPECT_EQ(alone.cycles, asked.cycles);
 }
 
 TEST(OwnSlot, SaysForWhichParametersItWasValidated) {

@@ -61,6 +61,10 @@ inline bool same_image(const ColorSurface& a, const ColorSurface& b) {
   return true;
 }
 
+inline double percent_above(std::uint64_t value, std::uint64_t reference) {
+  return 100 * (static_cast<double>(value) / static_cast<double>(reference) - 1);
+}
+
 inline std::uint64_t statistic(const RunResult& result, const std::string& name) {
   for (const StatisticReport& report : result.statistics) {
     if (report.name == name) return report.value;

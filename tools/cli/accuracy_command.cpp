@@ -1,5 +1,7 @@
 #include <iostream>
 
+#include <boost/algorithm/string/classification.hpp>
+#include <boost/algorithm/string/split.hpp>
 #include <nlohmann/json.hpp>
 
 #include <vrpipe/component/printable.h>
@@ -38,6 +40,10 @@ class AccuracyCommand : public Command {
                          "measures each rung of the fidelity ladder N times, interleaved, and\n"
                          "takes the median of the seconds (default: 1)",
                          ladders);
+    arguments.add_option("--at-cycle", at_cycle_, "UNIT,...",
+                         "a rung with these units at cycle among others at lt; can be repeated\n"
+                         "(default: zrop,crop)",
+                         ladders);
     arguments.add_option("--html", html_, "FILE",
                          "writes a page with plots, images and error maps; it needs no network", result_group);
     arguments.add_flag("--markdown", markdown_, "prints the tables as Markdown in place of the report", result_group);
@@ -68,6 +74,7 @@ class AccuracyCommand : public Command {
     job.markdown = markdown_;
     if (const auto text = single(repeat_, "--repeat")) job.repeat = parse_count(*text, "--repeat", largest_repeat);
     if (const auto file = single(html_, "--html")) job.html = *file;
+    if (!at_cycle_.empty()) job.units_at_cycle = units_at_cycle(job.simulation.requests);
 
     ProgressLine progress;
     AccuracyResult result = measure_accuracy(job, progress);
@@ -93,8 +100,22 @@ class AccuracyCommand : public Command {
   }
 
  private:
+  /// Of --at-cycle. Throws UserError for what no variant can have.
+  std::vector<std::vector<std::string>> units_at_cycle(const std::vector<RunRequest>& requests) const {
+    std::vector<std::vector<std::string>> all;
+    for (const std::string& text : at_cycle_) {
+      RunRequest request = requests.front();
+      request.fidelity = Fidelity::lt;
+      request.units_at_cycle.clear();
+      boost::split(request.units_at_cycle, text, boost::is_any_of(","));
+      if (request.variant.is_of_pipeline()) check_configuration(request);
+      all.push_back(request.units_at_cycle);
+    }
+    return all;
+  }
+
   SimulationArguments arguments_;
-  Values repeat_, html_;
+  Values repeat_, html_, at_cycle_;
   bool quick_ = false;
   bool markdown_ = false;
 };

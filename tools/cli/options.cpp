@@ -316,7 +316,9 @@ void SimulationArguments::declare_fidelity(Arguments& arguments) {
       .add_option("--fidelity", fidelity_, "NAME",
                   "how exact time is, from images and counts alone to every unit in every\n"
                   "cycle: " +
-                      names_of(fidelities()) + " (default: cycle)",
+                      names_of(fidelities()) +
+                      " (default: cycle);\n"
+                      "lt,UNIT=cycle,... has some units in every cycle among others at lt",
                   rules_group)
       .default_text = vrpipe::name_of(Fidelity::cycle);
 }
@@ -631,7 +633,7 @@ RunRequest SimulationArguments::machine(SettingsByPart& parts, const Invocation&
                                         const Platform* platform) const {
   RunRequest request;
   request.platform = platform_.empty() && platform != nullptr ? platform : chosen_platforms().front();
-  if (const auto name = single(fidelity_, "--fidelity")) request.fidelity = fidelity_named(*name);
+  if (const auto name = single(fidelity_, "--fidelity")) choose_fidelity(request, *name);
   std::vector<Setting> settings;
   for (const Setting& setting : parse_settings(settings_)) {
     if (!restates_preprocessing(setting) || !of_file(invocation)(setting)) settings.push_back(setting);

@@ -202,6 +202,15 @@ void compare_rungs(FidelityLevel* levels, std::size_t count) {
   for (std::size_t i = 1; i < timed.size(); ++i) timed[i]->dominated = beaten[i];
 }
 
+bool can_be(const RunRequest& request) {
+  try {
+    check_configuration(request);
+  } catch (const UserError&) {
+    return false;
+  }
+  return true;
+}
+
 bool is_finest(const RunRequest& request) { return request.fidelity == finest_fidelity(request.variant); }
 bool is_of_pipeline(const RunRequest& request) { return request.variant.is_of_pipeline(); }
 
@@ -214,8 +223,16 @@ std::vector<RunRequest> fidelity_requests(const AccuracyJob& job) {
     if (job.quick && variant.quad_merging != variant.early_termination) continue;  // pipelines alone have either
     for (auto fidelity = fidelities().rbegin(); fidelity != fidelities().rend(); ++fidelity) {
       if (*fidelity > finest_fidelity(variant)) continue;
-      requests.push_back(request);
-      requests.back().fidelity = *fidelity;
+      RunRequest level = request;
+      level.fidelity = *fidelity;
+      if (*fidelity == Fidelity::lt && variant.is_of_pipeline()) {
+        for (const std::vector<std::string>& units : job.units_at_cycle) {
+          level.units_at_cycle = units;
+          if (can_be(level)) requests.push_back(level);
+        }
+      }
+      level.units_at_cycle.clear();
+      requests.push_back(std::move(level));
     }
   }
   return requests;
@@ -226,9 +243,9 @@ void climb_fidelities(const AccuracyJob& job, const Workload& workload, const st
   std::vector<Task> tasks;
   for (unsigned round = 0; round < job.repeat; ++round) {
     for (const RunRequest& request : requests) {
-      tasks.push_back(
-          {request.variant.name + " " + vrpipe::name_of(request.fidelity), request,
-           [&workload](const RunRequest& own) { return make_frame(own, workload.description, workload.frame); }});
+      tasks.push_back({request.variant.name + " " + fidelity_of(request), request, [&workload](const RunRequest& own) {
+                         return make_frame(own, workload.description, workload.frame);
+                       }});
     }
   }
   result.fidelity.resize(requests.size());
@@ -256,7 +273,8 @@ void climb_fidelities(const AccuracyJob& job, const Workload& workload, const st
     level.quads_per_second = level.cpu_seconds > 0 ? quads / level.cpu_seconds : 0;
     for (const FidelityLevel& other : result.fidelity) {
       const RunRequest& baseline = other.run.request;
-      if (baseline.variant.name != requests.front().variant.name || baseline.fidelity != level.run.request.fidelity)
+      if (baseline.variant.name != requests.front().variant.name ||
+          fidelity_of(baseline) != fidelity_of(level.run.request))
         continue;
       level.speedup = speedup(other.run, level.run);
     }
@@ -286,7 +304,10 @@ std::vector<Task> stress_tasks(const AccuracyJob& job, const Workload& workload,
     if (job.quick && !configuration.quick) continue;
     std::vector<RunRequest> requests;
     try {
-      for (const RunRequest& variant : variants) requests.push_back(stressed(of_variant_alone(variant), configuration));
+      for (const RunRequest& variant : variants) {
+        requests.push_back(stressed(of_variant_alone(variant), configuration));
+        requests.back().units_at_cycle.clear();
+      }
     } catch (const UserError& error) {
       result.stress_left_out.push_back({configuration.name, error.what()});
       continue;

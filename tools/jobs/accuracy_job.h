@@ -26,6 +26,8 @@ struct AccuracyJob {
   unsigned repeat = 1;                        ///< times that each level of the fidelity ladder is measured
   std::optional<std::filesystem::path> html;  ///< file
   bool markdown = false;                      ///< the tables for documentation in place of the report
+  /// Units that are at cycle among others at lt, a level of the fidelity ladder for each set of them, where it can be had.
+  std::vector<std::vector<std::string>> units_at_cycle = {{"zrop", "crop"}};
 };
 
 // Of the ladders. CPU seconds and error in cycles, percent; simulated cycles and dB of PSNR.

@@ -39,6 +39,13 @@ Fidelity finest_fidelity_of(const std::vector<RunResult>& runs) {
   return finest;
 }
 
+std::string finest_fidelity_text(const std::vector<RunResult>& runs) {
+  const Fidelity finest = finest_fidelity_of(runs);
+  const auto first =
+      std::find_if(runs.begin(), runs.end(), [&](const RunResult& run) { return run.request.fidelity == finest; });
+  return first == runs.end() ? vrpipe::name_of(finest) : fidelity_of(first->request);
+}
+
 bool are_of_several_platforms(const std::vector<RunResult>& runs) {
   return std::any_of(runs.begin(), runs.end(),
                      [&](const RunResult& run) { return run.request.platform != runs.front().request.platform; });

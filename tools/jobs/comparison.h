@@ -18,6 +18,8 @@ std::optional<double> early_termination_ratio(const std::vector<RunResult>& runs
 
 /// The most exact fidelity of any run.
 Fidelity finest_fidelity_of(const std::vector<RunResult>& runs);
+/// What `--fidelity` says for the first that has it.
+std::string finest_fidelity_text(const std::vector<RunResult>& runs);
 
 /// Whether runs are of several platforms.
 bool are_of_several_platforms(const std::vector<RunResult>& runs);

@@ -66,7 +66,7 @@ nlohmann::json request_identity(const RunRequest& request) {
           {"variant",
            {valid_utf8(variant.name), valid_utf8(variant.base), units(variant.changed_units),
             settings_identity(variant.changed_settings)}},
-          {"fidelity", vrpipe::name_of(request.fidelity)},
+          {"fidelity", fidelity_of(request)},
           {"effects", request.effects.text()},
           {"format", vrpipe::name_of(request.format)},
           {"termination", name_of(request.termination)},

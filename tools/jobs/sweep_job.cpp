@@ -573,7 +573,7 @@ RunRequest request_of(const SweepJob& job, const StudiedPoint& point) {
     const std::string& value = job.study.axes[i].values[point.values[i]];
     if (axis == "platform") request.platform = &platform_named(value);
     if (axis == "variant") request.variant = variant_named(value);
-    if (axis == "fidelity") request.fidelity = fidelity_named(value);
+    if (axis == "fidelity") choose_fidelity(request, value);
     if (axis == "format") request.format = color_format_named(value);
     if (axis == "termination") request.termination = termination_named(value);
     if (!is_parameter(axis) || axis.rfind("preprocess.", 0) == 0) continue;

@@ -163,13 +163,10 @@ void Trace::add_statistics(const std::vector<std::string>& there) {
 TraceFile& Trace::file() {
   if (file_ != nullptr) return *file_;
   const Platform& platform = *request_.platform;
-  nlohmann::json about{{"platform", platform.name},
-                       {"variant", request_.variant.name},
-                       {"fidelity", vrpipe::name_of(request_.fidelity)},
-                       {"scene", scene_},
-                       {"frequency_mhz", platform.frequency_mhz},
-                       {"cycles_between_counters", every_},
-                       {"from_cycle", window_.from}};
+  nlohmann::json about{
+      {"platform", platform.name}, {"variant", request_.variant.name},        {"fidelity", fidelity_of(request_)},
+      {"scene", scene_},           {"frequency_mhz", platform.frequency_mhz}, {"cycles_between_counters", every_},
+      {"from_cycle", window_.from}};
   if (window_.to != never) about["to_cycle"] = window_.to;
   file_ = std::make_unique<TraceFile>(path_, option, platform.frequency_mhz, about);
   const std::string title = platform.name + " " + request_.variant.name;

@@ -18,7 +18,7 @@ Json cycles_json(const RunResult& run) { return run.cycles ? Json(*run.cycles) :
 Json decibels_json(double psnr) { return std::isinf(psnr) ? Json() : Json(psnr); }
 
 Json fidelity_json(const FidelityLevel& level) {
-  return {{"fidelity", vrpipe::name_of(level.run.request.fidelity)},
+  return {{"fidelity", fidelity_of(level.run.request)},
           {"variant", level.run.request.variant.name},
           {"cycles", cycles_json(level.run)},
           {"cycles_error_percent", optional_json(level.cycles_error_percent)},
@@ -130,7 +130,7 @@ Json accuracy_json(const AccuracyResult& result) {
                {"quick", result.quick},
                {"repeat", result.repeat},
                {"precision_variant", result.base.variant.name},
-               {"precision_fidelity", vrpipe::name_of(result.base.fidelity)},
+               {"precision_fidelity", fidelity_of(result.base)},
                {"precision_processes", result.processes},
                {"precision_left_out", result.precision_left_out.empty() ? Json() : Json(result.precision_left_out)},
                {"knobs_left_out", left_out},

@@ -66,13 +66,14 @@ constexpr std::array<const char*, 8> fidelity_colors{"#0072b2", "#d1400f", "#009
                                                      "#cc79a7", "#56b4e9", "#7a3e9d", "#6b4a2b"};
 
 std::string fidelity_plot(const AccuracyResult& result) {
-  constexpr Marker markers[] = {Marker::triangle, Marker::square, Marker::diamond, Marker::circle, Marker::star};
+  constexpr Marker markers[] = {Marker::triangle, Marker::square, Marker::diamond, Marker::circle};
   Plot plot;
   plot.description = "error in cycles against CPU seconds, for each variant and fidelity";
   plot.x = {"CPU seconds (logarithmic)", true};
   plot.y = {"error in cycles, % (logarithmic, none at the bottom)", true};
   std::vector<std::string> variants_seen;
-  std::vector<Fidelity> fidelities_seen;
+  std::vector<std::string> fidelities_seen;
+  decltype(plot.legend) legend;
   bool any_dominated = false;
   for (const FidelityLevel& level : result.fidelity) {
     const RunRequest& request = level.run.request;
@@ -84,12 +85,16 @@ std::string fidelity_plot(const AccuracyResult& result) {
       return seen.size() - 1;
     };
     const std::size_t variant = index_of(variants_seen, request.variant.name);
-    index_of(fidelities_seen, request.fidelity);
-    const std::string name = fmt::format("{} {}", request.variant.name, vrpipe::name_of(request.fidelity));
+    const std::string fidelity = fidelity_of(request);
+    // Those with units at cycle have one marker.
+    const Marker marker =
+        fidelity != vrpipe::name_of(request.fidelity) ? Marker::star : markers[static_cast<unsigned>(request.fidelity)];
+    if (index_of(fidelities_seen, fidelity) == legend.size())
+      legend.push_back({fidelity, "#4d5b6a", marker, false, false});
+    const std::string name = fmt::format("{} {}", request.variant.name, fidelity);
     const double error = std::fabs(*level.cycles_error_percent);
     const char* const color = fidelity_colors[variant % fidelity_colors.size()];
-    plot.points.push_back({level.cpu_seconds, error, color, markers[static_cast<unsigned>(request.fidelity)],
-                           level.dominated, name,
+    plot.points.push_back({level.cpu_seconds, error, color, marker, level.dominated, name,
                            fmt::format("{}: {:.2g} % in {:.2f} s{}", name, error, level.cpu_seconds,
                                        level.dominated ? ", dominated" : "")});
     any_dominated |= level.dominated;
@@ -101,10 +106,7 @@ std::string fidelity_plot(const AccuracyResult& result) {
     plot.legend.push_back(
         {variants_seen[i], fidelity_colors[i % fidelity_colors.size()], Marker::circle, false, false});
   }
-  for (const Fidelity fidelity : fidelities_seen) {
-    plot.legend.push_back(
-        {vrpipe::name_of(fidelity), "#4d5b6a", markers[static_cast<unsigned>(fidelity)], false, false});
-  }
+  plot.legend.insert(plot.legend.end(), legend.begin(), legend.end());
   plot.legend.push_back({"front of a variant", "#4d5b6a", Marker::circle, false, true});
   if (any_dominated) plot.legend.push_back({"dominated", "#4d5b6a", Marker::circle, true, false});
   return figure("error against time", plot);
@@ -250,7 +252,7 @@ std::string precision_section(const AccuracyResult& result) {
       "<p>{} at {} fidelity, with one choice changed at a time. Errors are against an image in double precision: no "
       "tiles, no termination, all bands, exact order, alpha below 1/255 pruned. What lies further left takes the "
       "modelled hardware less time, further up is more exact.</p>\n",
-      html_escaped(result.base.variant.name), vrpipe::name_of(result.base.fidelity));
+      html_escaped(result.base.variant.name), fidelity_of(result.base));
   if (result.runs.front().run.cycles) {
     text += precision_plot(result) +
             "<p class=\"subtle\">What lies on the default has no label; a point's name shows under the pointer.</p>\n" +

@@ -151,16 +151,28 @@ struct FidelityRange {
   double worst_image_db = INFINITY;
 };
 
-FidelityRange range_of(const AccuracyResult& result, Fidelity fidelity) {
+/// The levels of the ladder, the least exact first, as fidelity_of has them.
+std::vector<std::string> levels_of(const AccuracyResult& result) {
+  std::vector<std::string> levels;
+  for (const Fidelity fidelity : fidelities()) {
+    for (const FidelityLevel& level : result.fidelity) {
+      const std::string name = fidelity_of(level.run.request);
+      if (level.run.request.fidelity == fidelity && std::find(levels.begin(), levels.end(), name) == levels.end())
+        levels.push_back(name);
+    }
+  }
+  return levels;
+}
+
+FidelityRange range_of(const AccuracyResult& result, const std::string& fidelity) {
   FidelityRange range;
   const auto is_finest = [](const RunRequest& request) { return request.fidelity == finest_fidelity(request.variant); };
   for (const FidelityLevel& level : result.fidelity) {
-    if (level.run.request.fidelity != fidelity) continue;
-    range.is_there = true;
+    if (fidelity_of(level.run.request) != fidelity) continue;
     range.is_reference = range.is_reference && is_finest(level.run.request);
   }
   for (const FidelityLevel& level : result.fidelity) {
-    if (level.run.request.fidelity != fidelity || (is_finest(level.run.request) && !range.is_reference)) continue;
+    if (fidelity_of(level.run.request) != fidelity || (is_finest(level.run.request) && !range.is_reference)) continue;
     range.timed = level.run.cycles.has_value();
     range.always_dominated &= level.dominated;
     range.slowest = std::min(range.slowest, level.times_as_fast);
@@ -235,7 +247,7 @@ AccuracyTable fidelity_table(const AccuracyResult& result) {
     const RunResult& run = level.run;
     table.rows.push_back(
         {run.request.variant.name,
-         {vrpipe::name_of(run.request.fidelity), cycles_text(run), signed_percent(level.cycles_error_percent),
+         {fidelity_of(run.request), cycles_text(run), signed_percent(level.cycles_error_percent),
           level.speedup ? fmt::format("{:.3f}", *level.speedup) : "-", signed_percent(level.speedup_error_percent),
           fmt::format("{:.2f}", level.cpu_seconds), fmt::format("{:.2f}x", level.times_as_fast),
           level.dominated ? "yes" : "",
@@ -362,13 +374,14 @@ std::string within(double percent) {
 std::string fidelity_verdict(const AccuracyResult& result) {
   const std::string exact = most_exact_text(result);
   std::string text;
-  for (auto fidelity = fidelities().rbegin(); fidelity != fidelities().rend(); ++fidelity) {
-    const FidelityRange range = range_of(result, *fidelity);
-    if (!range.is_there || range.is_reference) continue;
+  const std::vector<std::string> levels = levels_of(result);
+  for (auto level = levels.rbegin(); level != levels.rend(); ++level) {
+    const FidelityRange range = range_of(result, *level);
+    if (range.is_reference) continue;
     const bool first = text.empty();
-    text += fmt::format("{}{}: {}{}, {}", first ? "" : "; ", vrpipe::name_of(*fidelity), times_text(range),
-                        first ? " as fast as " + exact : "",
-                        range.timed ? "cycles within " + within(range.cycles_percent) : "without cycles");
+    text +=
+        fmt::format("{}{}: {}{}, {}", first ? "" : "; ", *level, times_text(range), first ? " as fast as " + exact : "",
+                    range.timed ? "cycles within " + within(range.cycles_percent) : "without cycles");
   }
   return text;
 }
@@ -389,10 +402,9 @@ std::string precision_definition() {
 
 std::vector<std::string> fidelity_summary(const AccuracyResult& result) {
   std::vector<std::string> lines;
-  for (const Fidelity fidelity : fidelities()) {
-    const FidelityRange range = range_of(result, fidelity);
-    if (!range.is_there) continue;
-    std::string line = fmt::format("{}: ", vrpipe::name_of(fidelity));
+  for (const std::string& level : levels_of(result)) {
+    const FidelityRange range = range_of(result, level);
+    std::string line = level + ": ";
     if (range.is_reference) {
       line += "what the others are measured against";
     } else {
@@ -496,7 +508,7 @@ std::string fidelity_title(const AccuracyResult& result) {
 
 std::string precision_title(const AccuracyResult& result) {
   return fmt::format("Precision of {} at {}, against exact arithmetic: {} simulation{} at a time",
-                     result.base.variant.name, vrpipe::name_of(result.base.fidelity), result.processes,
+                     result.base.variant.name, fidelity_of(result.base), result.processes,
                      result.processes == 1 ? "" : "s");
 }
 

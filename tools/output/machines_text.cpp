@@ -14,7 +14,7 @@ namespace vrpipe::tools {
 namespace {
 
 std::string common_text(const RunRequest& request, const std::vector<Setting>& preprocessing, std::uint32_t passes) {
-  std::string text = fmt::format("{} fidelity, {} colour, {} termination", vrpipe::name_of(request.fidelity),
+  std::string text = fmt::format("{} fidelity, {} colour, {} termination", fidelity_of(request),
                                  vrpipe::name_of(request.format), name_of(request.termination));
   if (passes > 1) text += fmt::format(", {} passes", passes);
   text += effects_choice_text(request);

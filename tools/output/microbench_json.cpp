@@ -68,7 +68,7 @@ Json microbench_json(const MicrobenchRun& run) {
   machine.parameters = run.results.front().parameters;
   json["platform"] = platform_json({machine}, {}, run.provenance);
   json["units"] = chosen_units_json(run.request);
-  json["fidelity"] = vrpipe::name_of(run.request.fidelity);
+  json["fidelity"] = fidelity_of(run.request);
   json["microbenchmarks"] = Json::array();
   for (const MicrobenchResult& result : run.results) {
     Json figures = Json::array();

@@ -73,8 +73,7 @@ std::string microbench_page(const MicrobenchRun& run) {
   const Platform& platform = *run.request.platform;
   std::string text = page_head("vrpipe microbench: " + platform.name, own_style) + "<h1>Microbenchmarks</h1>\n";
   text += fmt::format("<p class=\"subtle\">{} ({}), {} fidelity. What differs from what is published is marked.</p>\n",
-                      html_escaped(platform.name), html_escaped(platform.description),
-                      vrpipe::name_of(run.request.fidelity));
+                      html_escaped(platform.name), html_escaped(platform.description), fidelity_of(run.request));
   for (const MicrobenchResult& result : run.results) {
     text += fmt::format("<h2 id=\"{0}\">{0}</h2>\n<p>{1}</p>\n", result.name, html_escaped(result.question));
     text += table_html(result) + "<ul>\n";

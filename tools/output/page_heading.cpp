@@ -84,7 +84,7 @@ std::string verdict(const JobResult& result) {
   if (baseline.counts.fragments_rasterized == 0) return "Nothing is visible.";
   if (!baseline.cycles) {
     return fmt::format("{} blends {} fragments; at {} fidelity nothing takes time.", name_of(baseline.request),
-                       grouped(baseline.counts.fragments_blended), vrpipe::name_of(baseline.request.fidelity));
+                       grouped(baseline.counts.fragments_blended), fidelity_of(baseline.request));
   }
   const auto bound_by = [](const RunResult& run) {
     std::string text = bound_text(run);
@@ -133,7 +133,7 @@ std::string heading_section(const JobResult& result) {
                 fmt::format("{}: {} ({:g} MHz)", platform.name, platform.description, platform.frequency_mhz));
     }
   }
-  terms.add("fidelity", vrpipe::name_of(request.fidelity));
+  terms.add("fidelity", fidelity_of(request));
   terms.add("termination", name_of(request.termination));
   terms.add("effects", request.effects.text());
   if (result.passes > 1) terms.add("passes", fmt::format("{}", result.passes));

@@ -366,7 +366,7 @@ std::string validated_text(const std::vector<RunResult>& runs) {
   std::string text;
   for (const auto& [reason, names] : names_of_reason) {
     const bool is_of_all = names.size() == runs.size();
-    text += fmt::format("{}{} may be off: {}; confirm at cycle\n", vrpipe::name_of(runs.front().request.fidelity),
+    text += fmt::format("{}{} may be off: {}; confirm at cycle\n", fidelity_of(runs.front().request),
                         is_of_all ? "" : fmt::format(" of {}", fmt::join(names, ", ")), reason);
   }
   return text;
@@ -382,7 +382,7 @@ std::string expected_error_text(const std::vector<RunResult>& runs) {
   }
   if (parts.empty()) return {};
   return fmt::format("{}: cycles within {}, as nine of ten runs whose bottleneck is as busy\n",
-                     vrpipe::name_of(runs.front().request.fidelity), fmt::join(parts, ", "));
+                     fidelity_of(runs.front().request), fmt::join(parts, ", "));
 }
 
 /// What quad merging adds, once for all runs that add the same.
@@ -475,8 +475,8 @@ std::string fidelities_text(const std::vector<RunResult>& runs) {
   std::string text;
   for (const RunResult& run : runs) {
     if (run.request.fidelity >= finest_fidelity_of(runs)) continue;
-    text += fmt::format("{} is at {}: there is nothing more exact of it\n", name_of(run.request),
-                        vrpipe::name_of(run.request.fidelity));
+    text +=
+        fmt::format("{} is at {}: there is nothing more exact of it\n", name_of(run.request), fidelity_of(run.request));
   }
   return text;
 }

@@ -249,7 +249,7 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, con
                {"outside_validated_range", run.outside_validated_range},
                {"expected_error_percent", optional_json(run.expected_error_percent)}};
   if (!run.request.variant.is_of_pipeline()) {
-    json["fidelity"] = vrpipe::name_of(run.request.fidelity);
+    json["fidelity"] = fidelity_of(run.request);
     json["kernels"] = kernels_json(run.kernels);
   }
   if (run.intervals) json["intervals"] = intervals_json(*run.intervals);
@@ -396,7 +396,7 @@ Json result_json(const JobResult& result) {
                {"scene", scene_json(result.scene, result.width, result.height)},
                {"camera", camera_json(result.viewpoint)},
                {"platform", std::move(platform)},
-               {"fidelity", vrpipe::name_of(finest_fidelity_of(result.runs))},
+               {"fidelity", finest_fidelity_text(result.runs)},
                {"format", vrpipe::name_of(request.format)},
                {"termination", name_of(request.termination)},
                {"effects", request.effects.text()},

@@ -92,7 +92,7 @@ Json views_json(const ViewsResult& result) {
                  {"orbit", !result.camera_file}}},
                {"platform", platform_json(runs, result.preprocessing, result.provenance)},
                {"implementations", Json::object()},
-               {"fidelity", vrpipe::name_of(finest_fidelity_of(runs))},
+               {"fidelity", finest_fidelity_text(runs)},
                {"format", vrpipe::name_of(request.format)},
                {"termination", name_of(request.termination)},
                {"effects", request.effects.text()},

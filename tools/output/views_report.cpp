@@ -119,7 +119,7 @@ std::string views_validated_text(const ViewsResult& result) {
   for (const ViewResult& view : result.views) {
     for (const std::string& reason : view.runs.front().outside_validated_range) ++reasons[reason];
   }
-  const char* const fidelity = vrpipe::name_of(result.views.front().runs.front().request.fidelity);
+  const std::string fidelity = fidelity_of(result.views.front().runs.front().request);
   std::string text;
   for (const auto& [reason, count] : reasons) {
     text += fmt::format("{} may be off in {}: {}; confirm at cycle\n", fidelity, count_of(count, "view"), reason);

@@ -40,12 +40,15 @@ class OutsidePort {
   virtual Unanswered oldest_unanswered() const = 0;
 };
 
+class LocalClock;
+
 /// One clock for many units: a single event, armed for the next cycle at which a unit has something to do.
 /// Cycles in which every unit sleeps cost nothing. Cycles are counted as integers; sc_time only carries them.
 class ClockDomain : public sc_core::sc_module {
  public:
   /// @param period_ps length of a cycle on the SystemC time axis, picoseconds (rounded; cycle counts are exact)
   ClockDomain(const sc_core::sc_module_name& name, std::uint64_t period_ps);
+  ~ClockDomain() override;
   SC_HAS_PROCESS(ClockDomain);
 
   /// Returns the handle for `wake`. Units tick in the order of attachment; the order does not change results.
@@ -100,7 +103,19 @@ class ClockDomain : public sc_core::sc_module {
   void fail(std::exception_ptr thrown);
 
   /// Where the draw ends that the units of this clock work on; they say what they know.
-  FrameEnd& frame_end() { return frame_end_; }
+  FrameEnd& frame_end() { return global_->frame_end_; }
+
+  /// Of a local clock (local_clock.h) the one that it is ahead of; otherwise itself.
+  const ClockDomain& global() const { return *global_; }
+  /// Cycles by which it is ahead of that.
+  Cycle lead() const { return now_ - std::min(now_, global_->now_); }
+  /// Has local clocks go on, those of this one, until something is so or all are at rest.
+  template <class Predicate>
+  void wait_until(Predicate&& is_so) {
+    while (!is_so() && step_locals()) continue;
+  }
+  /// While they go on for another's sake: then none enters a unit that waits.
+  bool steps_locals() const { return steps_locals_; }
 
   /// Whether the first edge has come.
   bool running() const { return running_; }
@@ -112,7 +127,7 @@ class ClockDomain : public sc_core::sc_module {
   /// Whether items and accesses between units of this clock pass their TLM-2.0 sockets also where the ends could call
   /// each other directly. The same in every cycle; it takes the host's time. Before ends are connected.
   void set_passes_sockets() { passes_sockets_ = true; }
-  bool passes_sockets() const { return passes_sockets_; }
+  bool passes_sockets() const { return global_->passes_sockets_; }
   /// Called when the simulation starts, if an outside port meets time of its own: whether the kernel's is to keep step.
   void ask_about_own_time(std::function<bool()> keeps_step) { keeps_step_ = std::move(keeps_step); }
 
@@ -140,13 +155,19 @@ class ClockDomain : public sc_core::sc_module {
   /// the first edge.
   void set_tick_order(std::vector<unsigned> order);
 
+ protected:
+  /// Of a local clock.
+  ClockDomain(const sc_core::sc_module_name& name, ClockDomain& global);
+
  private:
+  friend class LocalClock;
   void edge();
+  bool step_locals();
   bool tick_due(Cycle cycle);
   bool tick_due_in_order(Cycle cycle);
   void tick(Clocked& unit, Cycle cycle, Cycle& due);
   [[noreturn]] void fault_of_tick(const Clocked& unit) const;
-  void wake_from_outside(unsigned handle, Cycle at);
+  virtual void wake_from_outside(unsigned handle, Cycle at);
   void start_of_simulation() override;
 
   sc_core::sc_time period_;
@@ -157,6 +178,8 @@ class ClockDomain : public sc_core::sc_module {
   std::vector<std::uint64_t> active_;  ///< those due at an edge, beyond the first 64: a bit each
   std::vector<unsigned> tick_order_;   ///< of handles; empty for their own order
   FrameEnd frame_end_;
+  ClockDomain* const global_;
+  std::vector<LocalClock*> locals_;
   Cycle now_ = 0;
   Cycle next_ = 0;  ///< the edge that is armed; `never` for none
   Cycle stop_at_ = never;
@@ -175,6 +198,7 @@ class ClockDomain : public sc_core::sc_module {
   bool finished_ = false;
   bool pauses_at_rest_ = false;
   bool passes_sockets_ = false;
+  bool steps_locals_ = false;
 };
 
 }  // namespace vrpipe

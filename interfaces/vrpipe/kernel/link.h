@@ -98,6 +98,8 @@ class Port {
   unsigned stall_per_256_ = 0;
 };
 
+class OutPort;
+
 class InPort : public Port {
  public:
   using Port::Port;
@@ -105,6 +107,30 @@ class InPort : public Port {
   virtual void open() = 0;
   /// Whether nothing is queued.
   virtual bool empty() const = 0;
+  // Of a unit that is simulated cycle by cycle among others at `lt` (border.h):
+  /// What comes here follows from what the unit has sent: it may be known long before its time, for which it waits here.
+  void set_comes_ahead() { comes_ahead_ = true; }
+  bool comes_ahead() const { return comes_ahead_; }
+  /// The same of what units say that come later in the pipeline: they are asked for what they say before a cycle comes.
+  void set_answers() { comes_ahead_ = has_answers_ = true; }
+  bool has_answers() const { return has_answers_; }
+  /// What comes here follows from what the unit has sent there, and waits for room: what is sent meanwhile is withheld there.
+  void set_follows(const OutPort& out) { follows_ = &out; }
+  const OutPort* follows() const { return follows_; }
+  /// The unit passes on there what comes here, each in turn, and nothing else; it holds so many at most, beyond the queue.
+  void set_passes_to(const OutPort& out, unsigned holds) {
+    passes_to_ = &out;
+    holds_ = holds;
+  }
+  const OutPort* passes_to() const { return passes_to_; }
+  unsigned holds() const { return holds_; }
+
+ private:
+  bool comes_ahead_ = false;
+  bool has_answers_ = false;
+  const OutPort* follows_ = nullptr;
+  const OutPort* passes_to_ = nullptr;
+  unsigned holds_ = 0;
 };
 
 /// Of those of a link the one that sees such items; null for none. Throws UserError if there are others alone.
@@ -137,6 +163,7 @@ class PortOwner {
   const ClockHandle clock;
   std::vector<InPort*> in_ports;
   std::vector<OutPort*> out_ports;
+  unsigned sends_waiting = 0;  ///< at a border (border.h)
 };
 
 template <class Item>
@@ -161,6 +188,7 @@ class OutEnd : public OutPort, protected tlm::tlm_bw_transport_if<StreamProtocol
   }
   std::uint64_t transferred() const override { return transferred_; }
   unsigned pipeline_items() const { return pipeline_items_; }
+  unsigned pipeline_cycles() const { return pipeline_; }
   /// Called when the socket is bound by hand, for instance through a recorder.
   void taken() { mark_connected(); }
   using OutPort::connect;
@@ -223,6 +251,8 @@ class StreamOut : public OutEnd<Item> {
     }
     return this->limited_ ? limited_credits() : credits_;
   }
+  /// The free places as they will be known in the next cycle; a rate or random stalls may leave less of them.
+  unsigned next_credits() const { return credits_ + pending_; }
   /// Moves an item; `credits()` must not be 0.
   void push(const Item& item) {
     if (credits_ == 0) this->fault(this->socket, "an item was pushed without a credit");

@@ -207,9 +207,17 @@ class TimedOut : public OutEnd<Item> {
   Cycle last() const { return last_; }
   /// From when on there is room for another item.
   Cycle room_from() const { return end_ == nullptr ? 0 : end_->free_at_[end_->place_]; }
+  /// The same for the one that comes so many later.
+  Cycle room_from(std::uint64_t later) const {
+    return end_ == nullptr ? 0 : end_->free_at_[(end_->place_ + later) % end_->depth_];
+  }
+  /// Whether that is known: the receiver is at lt.
+  bool knows_room() const { return end_ != nullptr; }
   /// Of a unit that keeps items until it knows all that could go before them: sends those that go before a cycle, up to
   /// which the receiver knows that.
   void on_asked(std::function<void(Cycle until)> send) { asked_ = std::move(send); }
+  bool can_be_asked() const { return asked_ != nullptr; }
+  void ask(Cycle until) { asked_(until); }
 
  private:
   friend class TimedIn<Item>;
@@ -383,5 +391,7 @@ void TimedOut<Item>::connect(InPort& in, const LinkOptions& options) {
 /// As for `cycle` (unit.h): registered by each timing model for its slot.
 void register_timed_unit_maker(const std::string& slot, UnitMaker maker);
 const UnitMaker& timed_unit_maker(const std::string& slot);
+/// Whether a slot has one. At lt a unit of another is simulated at `cycle` (border.h).
+bool has_timed_unit_maker(const std::string& slot);
 
 }  // namespace vrpipe

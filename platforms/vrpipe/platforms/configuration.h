@@ -115,6 +115,8 @@ class Configuration {
   }
 
   const RunRequest& request() const { return request_; }
+  /// Whether it is simulated cycle by cycle, by the run's fidelity or by RunRequest::units_at_cycle.
+  bool is_at_cycle(const Instance& instance) const;
   const Platform& platform() const { return *request_.platform; }
   /// What is elaborated: the platform's, without what all its effects left out.
   const Netlist& netlist() const { return elaborated_; }
@@ -144,6 +146,7 @@ class Configuration {
   void check_left_out() const;
   void leave_out_parts(OmittedEffects& omitted, bool memories);
   void choose_implementations();
+  void check_units_at_cycle() const;
   void apply(const Setting& setting);
   void set_link(const Setting& setting);
   bool set_absent(const Setting& setting);

@@ -15,6 +15,7 @@ namespace vrpipe {
 
 class Hierarchy;
 class RunAhead;
+class Border;
 
 /// A platform with time: its netlist, elaborated as SystemC modules, in which gpc0.crop is a child of gpc0.
 class Gpu {
@@ -66,11 +67,14 @@ class Gpu {
   /// Closes all accounts with this cycle; returns it.
   Cycle close(Cycle end, std::atomic<float>* progress);
   Unit* find(const std::string& path) const;
+  /// Of a unit that is simulated cycle by cycle among others at lt; null for another.
+  Border* border_of(const std::string& path) const;
 
   const Configuration& configuration_;
   std::unique_ptr<ClockDomain> clock_;
   std::unique_ptr<Hierarchy> hierarchy_;
   EffectGate kernel_time_gate_;
+  std::map<std::string, std::unique_ptr<Border>> borders_;  ///< by path
   std::vector<PlacedMemory> memories_;
   std::vector<PlacedForeign> foreign_memories_;
   std::map<unsigned, std::unique_ptr<RunAhead>> ahead_;  ///< by GPC, in strict termination

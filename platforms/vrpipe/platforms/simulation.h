@@ -104,6 +104,8 @@ struct RunRequest {
   Variant variant;
   std::string name;  ///< what reports call it; empty for the variant's
   Fidelity fidelity = Fidelity::cycle;
+  /// At fidelity `lt`: slots, or paths of units, that are simulated at `cycle` all the same. At others it says nothing.
+  std::vector<std::string> units_at_cycle;
   ColorFormat format = ColorFormat::rgba16f;
   Termination termination = Termination::paper;
   std::vector<Setting> settings;
@@ -125,6 +127,10 @@ struct RunRequest {
   /// For tests: ticks units in a random order drawn from this seed; 0 for the order of wiring.
   std::uint64_t tick_order_seed = 0;
 };
+/// Sets what `--fidelity` says: one for all, or lt and units that are at cycle: lt,crop=cycle,gpc0.zrop=cycle. Throws UserError.
+void choose_fidelity(RunRequest& request, const std::string& text);
+/// The same of a run: lt, or lt,crop=cycle.
+std::string fidelity_of(const RunRequest& request);
 /// GPCs of the platform, by its settings, those of the variant and of the run. Throws UserError for a number that cannot be.
 unsigned gpcs_of(const RunRequest& request);
 /// The GPC that owns a screen tile, as the platform's crossbar has it; 0 where there is one GPC.
