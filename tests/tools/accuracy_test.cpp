@@ -341,7 +341,8 @@ TEST_F(Accuracy, FidelityHasEveryVariantAtEveryRung) {
   EXPECT_EQ(result["platform"]["name"], "agx-orin-ideal-memory");
   EXPECT_EQ(result["platform"]["parameters"]["state.exponential"], "ex2");
   const json& ladder = result["fidelity"];
-  ASSERT_EQ(ladder.size(), variants().size() * fidelities().size());
+  const std::vector<std::string> levels{"functional", "bound", "lt", "lt,zrop=cycle,crop=cycle", "cycle"};
+  ASSERT_EQ(ladder.size(), variants().size() * levels.size());
   std::map<std::string, double> baseline;
   std::map<std::string, double> exact;
   for (const json& level : ladder) {
@@ -352,11 +353,12 @@ TEST_F(Accuracy, FidelityHasEveryVariantAtEveryRung) {
   for (const Variant& variant : variants()) {
     std::vector<tools::TradeOff> timed;
     std::vector<bool> said;
-    for (const Fidelity fidelity : fidelities()) {
+    for (const std::string& name : levels) {
+      const Fidelity fidelity = fidelity_named(name.substr(0, name.find(',')));
       const json& level = ladder[i++];
       SCOPED_TRACE(level.dump());
       EXPECT_EQ(level["variant"], variant.name);
-      EXPECT_EQ(level["fidelity"], name_of(fidelity));
+      EXPECT_EQ(level["fidelity"], name);
       EXPECT_GT(level["host_seconds"].get<double>(), 0);
       EXPECT_GT(level["quads_per_second"].get<double>(), 0);
       EXPECT_TRUE(level["kernel_events"].is_number_unsigned());
@@ -372,7 +374,7 @@ TEST_F(Accuracy, FidelityHasEveryVariantAtEveryRung) {
       const double error = level["cycles_error_percent"];
       EXPECT_EQ(level["expected_error_percent"].is_number(), fidelity == Fidelity::lt || fidelity == Fidelity::cycle);
       EXPECT_NEAR(error, 100 * (cycles / exact[variant.name] - 1), 1e-9);
-      EXPECT_NEAR(level["speedup"].get<double>(), baseline[name_of(fidelity)] / cycles, 1e-9);
+      EXPECT_NEAR(level["speedup"].get<double>(), baseline[name] / cycles, 1e-9);
       EXPECT_NEAR(level["speedup_error_percent"].get<double>(),
                   100 * (level["speedup"].get<double>() / (baseline["cycle"] / exact[variant.name]) - 1), 1e-9);
       timed.push_back({level["cpu_seconds"], std::fabs(error)});
@@ -382,7 +384,7 @@ TEST_F(Accuracy, FidelityHasEveryVariantAtEveryRung) {
     expected.back() = false;  // what the others are measured against
     EXPECT_EQ(said, expected) << variant.name;
     const json& most_exact = ladder[i - 1];
-    for (std::size_t k = i - fidelities().size(); k < i; ++k) {
+    for (std::size_t k = i - levels.size(); k < i; ++k) {
       EXPECT_NEAR(ladder[k]["times_as_fast"].get<double>(),
                   most_exact["cpu_seconds"].get<double>() / ladder[k]["cpu_seconds"].get<double>(), 1e-9);
       EXPECT_NEAR(ladder[k]["quads_per_second"].get<double>() * ladder[k]["cpu_seconds"].get<double>(),
@@ -609,13 +611,26 @@ TEST_F(Accuracy, WhatCannotBeChangedInWhatWasAskedForIsLeftOutAndSaysSo) {
   EXPECT_NE(finished.out.find("\ncrop.cache_bytes=262144\n"), std::string::npos);
 }
 
+TEST_F(Accuracy, HasARungForEachSetOfUnitsAtCycle) {
+  const json result = accuracy({"--quick", "--at-cycle", "crop", "--at-cycle", "tc,qru"});
+  std::vector<std::string> names;
+  for (const json& level : result["fidelity"]) {
+    if (level["variant"] == "baseline") names.push_back(level["fidelity"]);
+  }
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"functional", "bound", "lt", "lt,tc=cycle,qru=cycle", "lt,crop=cycle", "cycle"}));
+  const Finished finished = vrpipe({"accuracy", "--quick", "--scene", "tiny.spl", "--at-cycle", "corp"});
+  EXPECT_EQ(finished.code, 2);
+  EXPECT_NE(finished.err.find("did you mean crop?"), std::string::npos) << finished.err;
+}
+
 TEST_F(Accuracy, QuickIsSmallerAndSaysSo) {
   const Finished finished = vrpipe({"accuracy", "--quick", "--scene", "tiny.spl"});
   EXPECT_EQ(finished.code, 0) << finished.err;
   EXPECT_NE(finished.out.find("a quick look"), std::string::npos);
   const json quick = accuracy({"--quick"});
   EXPECT_TRUE(quick["quick"].get<bool>());
-  EXPECT_EQ(quick["fidelity"].size(), 2 * fidelities().size());
+  EXPECT_EQ(quick["fidelity"].size(), 2 * (fidelities().size() + 1));
   EXPECT_LT(quick["precision"].size(), accuracy({})["precision"].size());
 }
 
@@ -682,7 +697,7 @@ TEST_F(Accuracy, PageStandsAlone) {
     if (!row["default"].get<bool>()) runs.insert(row["knob"].get<std::string>() + row["value"].get<std::string>());
   }
   EXPECT_EQ(occurrences(page, "<img"), 1 + 2 * (1 + runs.size()));
-  for (const char* part : {"class=\"verdict\">lt: ", "times as fast as cycle",
+  for (const char* part : {"class=\"verdict\">lt,zrop=cycle,crop=cycle: ", "times as fast as cycle",
                            "class=\"verdict\">the default: ", "<b>dominated</b>: another", "<b>front</b>: nothing",
                            "accuracy --scene '&lt;b&gt;.spl' --quick --html page.html</code>"}) {
     EXPECT_NE(page.find(part), std::string::npos) << part;

@@ -77,8 +77,10 @@ const std::map<std::string, Words> texts_of = {
     {"--markdown", {"page.md"}},  // of reproduce; of accuracy a flag
     {"--quick", {}},
     {"--repeat", {"1", "3"}},
+    {"--at-cycle", {"crop", "zrop,sm"}},
 };
-const std::set<std::string> may_be_repeated = {"--set", "--unit", "--variant", "--platform", "--log", "--mesh"};
+const std::set<std::string> may_be_repeated = {"--set", "--unit", "--variant", "--platform",
+                                               "--log", "--mesh", "--at-cycle"};
 const Words commands = {"run", "compare", "accuracy", "microbench", "reproduce"};
 const Words microbenchmarks = {"tile-binning", "crop-cache", "all", "same-place"};
 

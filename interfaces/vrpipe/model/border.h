@@ -181,6 +181,9 @@ class IntoCycle final : public Clocked, public sc_core::sc_module, public PortOw
     Crossing<Exact, Loose>::into_cycle(*payload.item, {payload.at, payload.last}, payload.beats,
                                        [&](const Exact& item, Cycle at) {
                                          last_at_ = std::max(last_at_, at);
+                                         if (payload.joins && !waiting_.empty() && waiting_.back().at == at &&
+                                             Crossing<Exact, Loose>::join(waiting_.back().item, item))
+                                           return;
                                          waiting_.push({last_at_, item});
                                          ++offered_;
                                        });
@@ -203,6 +206,7 @@ class IntoCycle final : public Clocked, public sc_core::sc_module, public PortOw
     const Cycle next = border_.now() + 1;
     payload.at = std::max(payload.at, pushed_ > first ? first_pushed_at_ : next);
     payload.last = std::max(payload.last, pushed_ == offered_ ? pushed_at_ : next);
+    if (!waiting_.empty()) last_at_ = waiting_.back().at = std::max(last_at_, next);
   }
 
   Cycle tick(Cycle now) override {

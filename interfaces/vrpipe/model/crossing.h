@@ -21,6 +21,8 @@ struct Crossing {
   static void into_cycle(const Loose& item, CycleInterval at, unsigned, Push&& push) {
     push(item, at.first);
   }
+  /// Adds one to another of the same cycle, beside which it takes the link; false if they stay apart.
+  static bool join(Exact&, const Exact&) { return false; }
   template <class Send>
   void out_of_cycle(const Exact& item, Cycle at, Send&& send) {
     send(item, CycleInterval(at), 1U);
@@ -41,6 +43,7 @@ struct Crossing<QuadBeat, QuadBeat> {
       from = end;
     }
   }
+  static bool join(QuadBeat&, const QuadBeat&) { return false; }
   template <class Send>
   void out_of_cycle(const QuadBeat& item, Cycle at, Send&& send) {
     send(item, CycleInterval(at), 1U);
@@ -68,6 +71,7 @@ struct Crossing<QuadBeat, BinItem> {
     }
     item.storage->in_use = false;
   }
+  static bool join(QuadBeat&, const QuadBeat&) { return false; }
   template <class Send>
   void out_of_cycle(const QuadBeat& beat, Cycle at, Send&& send) {
     BinItem item;
@@ -117,6 +121,12 @@ struct Crossing<ColorBeat, ShadedWarpItem> {
       beat.quads[beat.count++] = {&warp, i};
     }
     push(beat, cycle);
+  }
+  static bool join(ColorBeat& beat, const ColorBeat& next) {
+    if (beat.mark != Mark::none || next.mark != Mark::none || beat.count + next.count > ColorBeat::capacity)
+      return false;
+    for (unsigned i = 0; i < next.count; ++i) beat.quads[beat.count++] = next.quads[i];
+    return true;
   }
   template <class Send>
   void out_of_cycle(const ColorBeat& beat, Cycle at, Send&& send) {
