@@ -57,6 +57,7 @@ class TimedCrop : public TimedUnit {
     out_done_.set_pipeline(time_.latency_cycles - 1);
     out_done_.set_optional();
     in_reads_.set_optional();
+    in_reads_.set_comes_ahead();
   }
 
   Behaviour& behaviour() override { return *behaviour_; }

@@ -39,6 +39,7 @@ class TimedInShader : public TimedUnit {
         memory_(*this, "memory", {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {
     out_done_.set_optional();
     in_reads_.set_optional();
+    in_reads_.set_comes_ahead();
   }
 
   Behaviour& behaviour() override { return *behaviour_; }

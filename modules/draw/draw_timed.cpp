@@ -23,6 +23,7 @@ class TimedDraw : public TimedUnit {
                                                                  return take_done(visible.first);
                                                                }));
       in_done_.back()->set_optional();
+      in_done_.back()->set_comes_ahead();
     }
     have_ = behaviour_->next(warp_);
   }

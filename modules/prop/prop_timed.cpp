@@ -61,6 +61,9 @@ class TimedProp : public TimedUnit {
     out_late_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
     out_late_.set_optional();
     in_late_.set_optional();
+    in_tested_.set_comes_ahead();
+    in_shaded_.set_comes_ahead();
+    in_late_.set_comes_ahead();
     if (!plan_.is_used()) out_release_.on_asked([this](Cycle until) { leave_until(until); });
   }
 

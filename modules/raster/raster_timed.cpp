@@ -26,6 +26,7 @@ class TimedRaster : public TimedUnit {
         quads_out_(time_.quads_per_cycle) {
     out_.set_pipeline(time_.setup_latency_cycles - 1, time_.fine_tiles_per_cycle);
     in_hi_z_.set_optional();
+    in_hi_z_.set_comes_ahead();
   }
 
   Behaviour& behaviour() override { return *behaviour_; }

@@ -52,6 +52,8 @@ class TimedSm : public TimedUnit {
     fragment_.for_each([&](const Program& each) { waiting_.resize(std::max(waiting_.size(), each.size())); });
     if (!EffectGate(context, "cache.details").is_active()) l1_statistics_.leave_out_details();
     free_slots_ = time_.fragment_slots();
+    in_release_.set_comes_ahead();
+    in_warps_.set_comes_ahead();
   }
 
   bool idle() const override { return next_event() == never; }
@@ -175,6 +177,8 @@ class TimedSm : public TimedUnit {
       if (has_slot_before(next) || next == never) break;
       hand_on_until(next);
     }
+    // What PROP has sent to be tested late may be in a unit at cycle.
+    clock.domain->wait_until([this] { return has_slot(); });
     if (!has_slot()) {
       throw SimulationFault("deadlock", launch, std::string(name()) + " has warps to launch, and no slot is released");
     }

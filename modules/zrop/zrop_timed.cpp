@@ -60,6 +60,8 @@ class TimedZrop : public TimedUnit {
     out_late_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
     out_late_.set_optional();
     in_late_.set_optional();
+    in_terminations_.set_comes_ahead();
+    in_late_.set_comes_ahead();
     out_reads_.set_optional();
   }
 

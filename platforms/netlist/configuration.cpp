@@ -245,12 +245,16 @@ void Configuration::choose_implementations() {
   }
 }
 
+namespace {
+bool is_before_crossbar(const std::string& slot) { return slot == "draw" || slot == "sm" || slot == "vpo"; }
+}  // namespace
+
 void Configuration::check_units_at_cycle() const {
   if (request_.fidelity != Fidelity::lt) return;
   for (const std::string& name : request_.units_at_cycle) {
     const std::string where = "--fidelity lt," + name + "=cycle";
     const std::vector<const Instance*> named = instances_named(name);
-    if (!named.empty() && netlist_.gpcs() > 1 && (named.front()->slot == "sm" || named.front()->slot == "vpo")) {
+    if (!named.empty() && netlist_.gpcs() > 1 && is_before_crossbar(named.front()->slot)) {
       throw UserError(
           "cannot simulate " + name + " at a fidelity of its own", where,
           fmt::format("the primitives of {} GPCs meet behind it in draw order, which at lt is that of the calls",

@@ -110,7 +110,7 @@ TEST(UnitsAtCycle, TheCrossbarIsOne) {
   RunRequest request = request_of("het");
   request.settings = {{"platform", "gpcs", "2"}};
   const RunResult cycle = run(request, draw);
-  for (const char* unit : {"wdx", "crop", "draw"}) {
+  for (const char* unit : {"wdx", "crop", "tgc"}) {
     const RunResult mixed = run(at_cycle(request, {unit}), draw);
     const double least = std::fabs(percent_above(*run(at_cycle(request, {}), draw).cycles, *cycle.cycles));
     EXPECT_NEAR(percent_above(*mixed.cycles, *cycle.cycles), 0, least + 1) << unit;

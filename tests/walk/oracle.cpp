@@ -227,6 +227,7 @@ class Judge {
       for (const Finding& finding : broken_rules(*untimed, *result)) find(stage, finding);
       compare_stencils(stage, *untimed, *result);
     }
+    mixed(*untimed);
     repetition();
     machine(*untimed);
     split(*untimed);
@@ -239,6 +240,22 @@ class Judge {
                                  [](const Part& part) { return part.stencil != Part::Stencil::untested; });
     if (!any || same_stencil(untimed.framebuffer.depth_stencil, timed.framebuffer.depth_stencil)) return;
     find(stage, {"order alone decides what is stored", "the stencil differs from the untimed one"});
+  }
+
+  /// A unit at cycle among others at lt.
+  void mixed(const RunResult& untimed) {
+    RunRequest request = case_.request(Fidelity::lt);
+    request.units_at_cycle = case_.units_at_cycle;
+    try {
+      check_configuration(request);
+    } catch (const UserError&) {
+      return;  // several GPCs, a memory of another make
+    }
+    const std::string stage = fidelity_of(request);
+    if (const auto result = simulated(stage, request)) {
+      for (const Finding& finding : broken_rules(untimed, *result)) find(stage, finding);
+      compare_stencils(stage, untimed, *result);
+    }
   }
 
   /// At cycle fidelity the order in which units tick must not matter either.

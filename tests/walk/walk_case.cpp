@@ -457,6 +457,9 @@ Case draw_case(std::uint64_t seed, std::uint64_t index, const Draw& real) {
   c.repeated = dice.one_of(fidelities());
   c.stalled = dice.one_of(timed);
   c.stall_seed = dice.next() | 1U;
+  Dice of_units(mix(mix(seed + 2) ^ index));
+  const std::vector<std::string> slots{"draw", "vpo", "tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"};
+  c.units_at_cycle.push_back(of_units.one_of(slots));
   c.draw = draw_scene(dice, real);
   c.parts = draw_parts(dice, c.draw.splats.size());
   Dice of_stencils(mix(mix(seed + 1) ^ index));

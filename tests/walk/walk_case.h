@@ -60,6 +60,7 @@ struct Case {
   /// What is run twice, and once with stalls.
   Fidelity repeated = Fidelity::cycle;
   Fidelity stalled = Fidelity::cycle;
+  std::vector<std::string> units_at_cycle;  ///< among others at lt
   std::uint64_t stall_seed = 1;
   /// What is simulated in another run of `repeated`: all effects, or some that the frame may not call for; empty for no such
   /// run.
