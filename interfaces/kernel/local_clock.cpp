@@ -38,7 +38,7 @@ void LocalClock::advance(Cycle until) {
     tick_due(cycle);
     in_edge_ = false;
     ++edges_;
-    after_edge();
+    rouse();
   }
 }
 

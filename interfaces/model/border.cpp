@@ -31,8 +31,6 @@ Cycle Lane::leaves(Cycle local) {
   return at;
 }
 
-Border::~Border() = default;
-
 Lane* Border::lane_to(const OutPort& out) {
   const auto found = lanes_.find(&out);
   return found == lanes_.end() ? nullptr : &found->second;
@@ -45,8 +43,6 @@ void Border::open() {
 void Border::before_edge(Cycle cycle) {
   for (const auto& ask : asks_) ask(cycle);
 }
-
-void Border::after_edge() { rouse(); }
 
 /// Whether anything was offered.
 bool Border::offer_held() {

@@ -246,6 +246,11 @@ void Configuration::choose_implementations() {
 }
 
 namespace {
+/// By its slot or its path.
+bool is_named(const std::string& name, const Instance& instance) {
+  return name == instance.slot || names_path(name, instance.path);
+}
+
 bool is_before_crossbar(const std::string& slot) { return slot == "draw" || slot == "sm" || slot == "vpo"; }
 }  // namespace
 
@@ -286,14 +291,13 @@ bool Configuration::is_at_cycle(const Instance& instance) const {
   const std::vector<std::string>& names = request_.units_at_cycle;
   if (request_.fidelity != Fidelity::lt) return request_.fidelity == Fidelity::cycle;
   if (!has_timed_unit_maker(instance.slot)) return true;
-  return std::any_of(names.begin(), names.end(),
-                     [&](const std::string& name) { return name == instance.slot || names_path(name, instance.path); });
+  return std::any_of(names.begin(), names.end(), [&](const std::string& name) { return is_named(name, instance); });
 }
 
 std::vector<const Instance*> Configuration::instances_named(const std::string& name) const {
   std::vector<const Instance*> found;
   for (const Instance& instance : netlist_.instances()) {
-    if (name == instance.slot || names_path(name, instance.path)) found.push_back(&instance);
+    if (is_named(name, instance)) found.push_back(&instance);
   }
   return found;
 }

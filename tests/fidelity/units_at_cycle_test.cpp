@@ -3,12 +3,12 @@
 #include <string>
 #include <vector>
 
-#include <vrpipe/component/error.h>
 #include <vrpipe/model/border.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/simulation.h>
 
 #include "support/mixed_frames.h"
+#include "support/refusals.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
@@ -127,19 +127,10 @@ TEST(UnitsAtCycle, ATextSaysThem) {
   EXPECT_EQ(fidelity_of(request), "cycle");
 }
 
-std::string error_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const UserError& error) {
-    return error.what();
-  }
-  return "accepted";
-}
-
 TEST(UnitsAtCycle, WhatCannotBeIsRefused) {
   const Draw draw = random_draw(16, 16, 1, 1);
   const auto refusal = [&](const std::string& unit, const std::function<void(RunRequest&)>& change = nullptr) {
-    return error_of([&] { run(at_cycle(request_of("het", Fidelity::lt, change), {unit}), draw); });
+    return refusal_of([&] { run(at_cycle(request_of("het", Fidelity::lt, change), {unit}), draw); });
   };
   EXPECT_NE(refusal("corp").find("did you mean crop?"), std::string::npos);
   EXPECT_NE(refusal("l2").find("a memory's is that of the run"), std::string::npos);
@@ -147,9 +138,9 @@ TEST(UnitsAtCycle, WhatCannotBeIsRefused) {
   EXPECT_NE(refusal("sm", several).find("2 GPCs"), std::string::npos);
   EXPECT_NE(refusal("vpo", several).find("2 GPCs"), std::string::npos);
   RunRequest request;
-  EXPECT_NE(error_of([&] { choose_fidelity(request, "cycle,crop=lt"); }).find("lt,crop=cycle"), std::string::npos);
-  EXPECT_NE(error_of([&] { choose_fidelity(request, "bound,crop=cycle"); }).find("lt,crop=cycle"), std::string::npos);
-  EXPECT_NE(error_of([&] { choose_fidelity(request, "lt,crop"); }).find("lt,crop=cycle"), std::string::npos);
+  EXPECT_NE(refusal_of([&] { choose_fidelity(request, "cycle,crop=lt"); }).find("lt,crop=cycle"), std::string::npos);
+  EXPECT_NE(refusal_of([&] { choose_fidelity(request, "bound,crop=cycle"); }).find("lt,crop=cycle"), std::string::npos);
+  EXPECT_NE(refusal_of([&] { choose_fidelity(request, "lt,crop"); }).find("lt,crop=cycle"), std::string::npos);
 }
 
 // A local clock that is 100 cycles ahead.

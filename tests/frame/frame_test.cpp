@@ -7,9 +7,12 @@
 #include <vrpipe/component/error.h>
 
 #include "support/builders.h"
+#include "support/refusals.h"
 
 namespace vrpipe {
 namespace {
+
+using testing::refusal_of;
 
 std::shared_ptr<const Draw> numbered_splats(std::uint32_t splats, std::uint32_t width = 64, std::uint32_t height = 48) {
   auto draw = std::make_shared<Draw>(testing::draw_of(width, height, std::vector<Splat>(splats)));
@@ -27,16 +30,6 @@ std::vector<bool> changes_in(const Frame& frame) {
   std::vector<bool> changes;
   for (const Frame::Command& command : frame.commands()) changes.push_back(command.changes_state);
   return changes;
-}
-
-template <class Action>
-std::string refusal_of(Action&& action) {
-  try {
-    action();
-  } catch (const UserError& error) {
-    return error.what();
-  }
-  return "none";
 }
 
 TEST(Frame, NumbersSplatsThroughAllDraws) {

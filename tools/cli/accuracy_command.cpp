@@ -106,7 +106,6 @@ class AccuracyCommand : public Command {
     for (const std::string& text : at_cycle_) {
       RunRequest request = requests.front();
       request.fidelity = Fidelity::lt;
-      request.units_at_cycle.clear();
       boost::split(request.units_at_cycle, text, boost::is_any_of(","));
       if (request.variant.is_of_pipeline()) check_configuration(request);
       all.push_back(request.units_at_cycle);

@@ -19,7 +19,7 @@ class LocalClock : public ClockDomain {
   void advance(Cycle until);
   /// The next edge that a unit wants; `never` for none.
   Cycle next_edge() const { return *std::min_element(due_.begin(), due_.end()); }
-  /// Does what does not wait for an edge; false if there is nothing.
+  /// Does what does not wait for an edge, as behind each; it may advance the clock. False if there is nothing.
   virtual bool rouse() { return false; }
 
  protected:
@@ -29,8 +29,6 @@ class LocalClock : public ClockDomain {
   void call_at(Cycle cycle);
   /// Called before the ticks of an edge; it may wake units for that cycle.
   virtual void before_edge(Cycle) {}
-  /// Called behind them; it may advance the clock.
-  virtual void after_edge() {}
 
  private:
   /// An edge of the global clock behind each of this one, so that it does not stay behind. In the same cycle it would matter

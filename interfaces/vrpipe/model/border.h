@@ -73,7 +73,6 @@ class Border final : public LocalClock {
   };
 
   using LocalClock::LocalClock;
-  ~Border() override;
 
   /// What stands at a port.
   void keep(std::unique_ptr<sc_core::sc_module> at_port) { at_ports_.push_back(std::move(at_port)); }
@@ -100,7 +99,6 @@ class Border final : public LocalClock {
 
  private:
   void before_edge(Cycle cycle) override;
-  void after_edge() override;
   bool offer_held();
   bool offer_followed();
 
@@ -327,18 +325,14 @@ class OutOfCycle final : public Clocked, public sc_core::sc_module, public PortO
     if (lane_ != nullptr) lane_->has_room(free_at, now);
     in.give(1);
   }
-  /// Places that are free in a cycle; returns when the next one is.
-  Cycle grant_what_is_free(Cycle now) {
+  /// Places that are free in a cycle; comes back when the next one is.
+  void grant_what_is_free(Cycle now) {
     for (Cycle free_at = next_free(); free_at != never; free_at = next_free()) {
       // The credit is given when the item leaves, and there a cycle later.
-      if (free_at > now + 1) {
-        clock.domain->wake(clock.unit, free_at - 1);
-        return free_at - 1;
-      }
+      if (free_at > now + 1) return border_.wake(clock.unit, free_at - 1);
       if (!out.knows_room()) free_at_.pop();
       grant(free_at, now);
     }
-    return never;
   }
   /// From when on the next place can be filled that is not granted yet; `never` if that is not known.
   Cycle next_free() {
@@ -346,12 +340,15 @@ class OutOfCycle final : public Clocked, public sc_core::sc_module, public PortO
     return granted_ < offered_ + depth_ ? out.room_from(granted_ - placed_) : never;
   }
   /// Not while an item is on its way, whose place is not known to be free or taken: then it is granted behind that.
-  Cycle tick(Cycle now) override { return is_offering_ ? never : grant_what_is_free(now); }
+  Cycle tick(Cycle now) override {
+    if (!is_offering_) grant_what_is_free(now);
+    return never;
+  }
 
   Border& border_;
   const OutPort& unit_out_;
   const PortOwner& receiver_;
-  const bool is_work_;                              ///< for the receiver, and not what comes ahead
+  const bool is_work_;  ///< for the receiver; at lt it takes what comes ahead while it waits, too
   const IntoCycle<Exact, Loose>* entry_ = nullptr;  ///< to a receiver at cycle
   Lane* lane_ = nullptr;                            ///< that leads here; null for none
   Crossing<Exact, Loose> crossing_;

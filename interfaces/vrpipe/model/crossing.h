@@ -12,26 +12,32 @@
 
 namespace vrpipe {
 
-/// How an item of a link at `lt`, Loose, becomes items at `cycle`, Exact, and back. Most links carry the same at both.
-/// `push(item, cycle)` for each that there is at cycle; `send(item, cycles, places of the link)` for each at lt.
-template <class Exact, class Loose>
-struct Crossing {
-  static_assert(std::is_same_v<Exact, Loose>, "an item that is another at lt has a Crossing of its own");
+/// Items that are the same at `cycle` and at `lt`. `push(item, cycle)` for each that there is at cycle;
+/// `send(item, cycles, places of the link)` for each at lt.
+template <class Item>
+struct SameAtBoth {
   template <class Push>
-  static void into_cycle(const Loose& item, CycleInterval at, unsigned, Push&& push) {
+  static void into_cycle(const Item& item, CycleInterval at, unsigned, Push&& push) {
     push(item, at.first);
   }
-  /// Adds one to another of the same cycle, beside which it takes the link; false if they stay apart.
-  static bool join(Exact&, const Exact&) { return false; }
   template <class Send>
-  void out_of_cycle(const Exact& item, Cycle at, Send&& send) {
+  void out_of_cycle(const Item& item, Cycle at, Send&& send) {
     send(item, CycleInterval(at), 1U);
   }
+  /// Adds one to another of the same cycle, beside which it takes the link; false if they stay apart.
+  static bool join(Item&, const Item&) { return false; }
+};
+
+/// How an item of a link at `lt`, Loose, becomes items at `cycle`, Exact, and back: in the words of SameAtBoth, which most links
+/// are.
+template <class Exact, class Loose>
+struct Crossing : SameAtBoth<Exact> {
+  static_assert(std::is_same_v<Exact, Loose>, "an item that is another at lt has a Crossing of its own");
 };
 
 /// A tile of RASTER's moves at once at lt, at cycle in as many beats as it takes of the link.
 template <>
-struct Crossing<QuadBeat, QuadBeat> {
+struct Crossing<QuadBeat, QuadBeat> : SameAtBoth<QuadBeat> {
   template <class Push>
   static void into_cycle(const QuadBeat& item, CycleInterval at, unsigned beats, Push&& push) {
     QuadBeat part = item;
@@ -42,11 +48,6 @@ struct Crossing<QuadBeat, QuadBeat> {
       push(part, at.of_part(beat, beats));
       from = end;
     }
-  }
-  static bool join(QuadBeat&, const QuadBeat&) { return false; }
-  template <class Send>
-  void out_of_cycle(const QuadBeat& item, Cycle at, Send&& send) {
-    send(item, CycleInterval(at), 1U);
   }
 };
 
