@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include <vrpipe/arithmetic/half.h>
 #include <vrpipe/workloads/portable_math.h>
 
 #include "for_each_chunk.h"
@@ -210,11 +211,11 @@ class BoundPrecision {
         running_(drawn.format, drawn.device.blend_rounding, drawn.merges, error_of_sending(drawn)),
         exponential_(error_of_exponential(drawn.device.exponential)),
         is_half_(drawn.device.shading == NumberFormat::fp16),
+        half_attributes_(is_half_ || drawn.device.attributes != AttributeFormat::fp32),
         alpha_max_(static_cast<double>(drawn.device.alpha_max)) {
     const AttributeFormat attributes = drawn.device.attributes;
-    const bool half_attributes = attributes != AttributeFormat::fp32 || is_half_;
     // Roundings of u and v beside single precision's: of a difference, a product and a sum; and of the matrix.
-    of_position_ = 16 * kSingle + (is_half_ ? 4 * kHalf : 0) + (half_attributes ? kHalf : 0);
+    of_position_ = 16 * kSingle + (is_half_ ? 4 * kHalf : 0) + (half_attributes_ ? kHalf : 0);
     of_power_ = 6 * kSingle + (is_half_ ? 5 * kHalf : 0);
     // Of the exponential's result, and of the product with opacity.
     exponential_ += is_half_ ? 3 * kHalf : 0;
@@ -258,17 +259,18 @@ class BoundPrecision {
     // u and v are sums of two products of a rounded difference and a rounded element of the axes' inverse, at most 1/|axis|.
     const double reach_u = sample.distance * splat.a().sigmas_per_pixel;
     const double reach_v = sample.distance * splat.b().sigmas_per_pixel;
-    const double off_u = of_position_ * reach_u;
-    const double off_v = of_position_ * reach_v;
+    const double off_u = of_position_ * reach_u + of_matrix(splat.a().sigmas_per_pixel) * sample.distance;
+    const double off_v = of_position_ * reach_v + of_matrix(splat.b().sigmas_per_pixel) * sample.distance;
     const double squared = sample.u * sample.u + sample.v * sample.v;
     const double power = 0.5 * (2 * (std::fabs(sample.u) * off_u + std::fabs(sample.v) * off_v) + off_u * off_u +
                                 off_v * off_v + of_power_ * squared);
-    // e^power - 1, rounded up.
-    const double of_power = power < 1 ? power * (1 + power) : portable_exp(std::min(power, 80.0));
+    // e^power - 1, rounded up; beyond e^700 nothing is known, and at most all of alpha is wrong.
+    const double of_power = power < 1 ? power * (1 + power) : portable_exp(std::min(power, 700.0));
     const double of_gauss = of_power + (1 + of_power) * (exponential_ + 2 * kSingle);
     const double gauss = sample.weight / splat.opacity();
-    const double off = sample.weight * (of_gauss + (1 + of_gauss) * of_opacity_) +
-                       opacity_step_ * std::min(1.0, gauss * (1 + of_gauss)) + (is_half_ ? 1e-6 : 0);
+    const double off = power > 700 ? 1
+                                   : sample.weight * (of_gauss + (1 + of_gauss) * of_opacity_) +
+                                         opacity_step_ * std::min(1.0, gauss * (1 + of_gauss)) + (is_half_ ? 1e-6 : 0);
     const double of_clamp = std::max(0.0, std::min(sample.weight, std::max(kLargestAlpha, alpha_max_)) -
                                               std::min(kLargestAlpha, alpha_max_));
     const double most = splat.opacity() + opacity_step_ + 4 * kHalf * (is_half_ || of_opacity_ > 0 ? 1 : 0);
@@ -276,10 +278,17 @@ class BoundPrecision {
            (is_half_ && sample.weight > 0.5 * alpha_max_ ? kHalf : 0);  // of the clamp itself
   }
 
+  /// Absolute, of an element of the axes' inverse in binary16: it saturates, and below 2^-14 its steps are no longer relative.
+  double of_matrix(double sigmas_per_pixel) const {
+    if (!half_attributes_) return 0;
+    return std::max(0.0, sigmas_per_pixel - static_cast<double>(half_max)) + 0x1p-25;
+  }
+
   DrawnPrecision drawn_;
   RunningBound running_;
   double exponential_;  ///< relative
   bool is_half_;
+  bool half_attributes_;
   double alpha_max_;
   double of_position_ = 0, of_power_ = 0, of_opacity_ = 0, of_color_ = 0;  ///< relative
   double opacity_step_ = 0, color_step_ = 0;                               ///< absolute

@@ -116,8 +116,9 @@ void SplatShader::set_up(Attributes& attributes, const Quad& quad) {
   const DevicePrecision& precision = context_.precision;
   const bool computes_in_half = precision.shading == NumberFormat::fp16;
   if (precision.attributes == AttributeFormat::fp32 && !computes_in_half) return;
+  // Beyond the largest half they saturate: infinite, they would make a NaN of a sample at the very centre.
   for (float* const value : {&attributes.m00, &attributes.m01, &attributes.m10, &attributes.m11})
-    *value = round_to_half(*value);
+    *value = round_to_half(std::clamp(*value, -half_max, half_max));
   const auto kept = [&](float value) {
     if (precision.attributes == AttributeFormat::quantized) value = round_to_unorm<255>(splat_lanes(value))[0];
     return precision.attributes == AttributeFormat::fp16 || computes_in_half ? round_to_half(value) : value;

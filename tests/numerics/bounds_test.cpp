@@ -168,6 +168,25 @@ TEST(Bounds, HoldForEveryPrecisionOfTheShader) {
   tightest(draw_of(4, 4, std::move(edges)), all);
 }
 
+TEST(Bounds, HoldForSplatsWhoseInverseNoHalfHolds) {
+  std::vector<Splat> specks;
+  for (std::uint64_t i = 0; i < 400; ++i) {
+    const auto x = static_cast<float>(i % 20) + 0.5F, y = static_cast<float>(i / 20) + 0.5F;
+    const float off = i % 3 == 0 ? 0 : uniform(5, 3 * i, -3e-5F, 3e-5F);
+    specks.push_back(
+        splat_at(x + off, y - off, uniform(5, 3 * i + 1, 1e-6F, 3e-5F), 1.5e-5F, uniform(5, 3 * i + 2, 0, 6.2F), 0.9F));
+  }
+  std::vector<Drawn> all;
+  for (const char* attributes : {"fp16", "quantized"}) {
+    all.push_back(drawn("baseline", ColorFormat::rgba32f, {{"state", "attributes", attributes}}));
+    all.back().precision.device.attributes =
+        attributes == std::string("fp16") ? AttributeFormat::fp16 : AttributeFormat::quantized;
+  }
+  all.push_back(drawn("baseline", ColorFormat::rgba32f, {{"state", "shading", "fp16"}}));
+  all.back().precision.device.shading = NumberFormat::fp16;
+  EXPECT_GT(tightest(draw_of(20, 20, std::move(specks)), all), 0.01);
+}
+
 TEST(Bounds, CountEachPixelsFragments) {
   const Draw draw = draw_of(4, 4, std::vector<Splat>(7, flat_box(-4, -4, 12, 12, 0.5F)));
   const BoundedImage bounded = render_with_bounds(draw, {});

@@ -7,6 +7,7 @@
 
 #include "sm/sm.h"
 #include "support/builders.h"
+#include "support/floating_point.h"
 
 namespace vrpipe {
 namespace {
@@ -155,6 +156,28 @@ TEST(ShaderPrecision, AttributesOfFewerBitsAreFewerBytes) {
   EXPECT_EQ(Shaded(splat, [](DevicePrecision& p) { p.attributes = AttributeFormat::fp16; }).attribute_bytes, 8U + 16);
   EXPECT_EQ(Shaded(splat, [](DevicePrecision& p) { p.attributes = AttributeFormat::quantized; }).attribute_bytes,
             8U + 8 + 4);
+}
+
+/// Sigmas below 1/65504 px, whose inverse no half holds.
+TEST(ShaderPrecision, AnInverseThatNoHalfHoldsSaturatesAndMakesNoNan) {
+  const testing::TrapInvalid trap;
+  for (const float sigma : {1.6e-5F, 1.4e-5F, 3e-6F, 1e-10F}) {
+    for (const float angle : {0.0F, 0.7F}) {
+      const Splat at_the_sample = splat_at(0.5F, 0.5F, sigma, sigma, angle, 0.75F);
+      const Splat beside_it = splat_at(0.51F, 0.5F, sigma, sigma, angle, 0.75F);
+      for (const AttributeFormat format : {AttributeFormat::fp16, AttributeFormat::quantized}) {
+        const auto attributes = [&](DevicePrecision& p) { p.attributes = format; };
+        const Shaded shaded({at_the_sample}, attributes);
+        ASSERT_EQ(shaded.out.count, 1) << sigma;
+        EXPECT_EQ(shaded.out.live[0], 1) << "only there";
+        EXPECT_NEAR(shaded.alpha(), 0.75, 1.0 / 255);
+        EXPECT_EQ(Shaded({beside_it}, attributes).out.count, 0);
+      }
+      const auto computes_in_half = [](DevicePrecision& p) { p.shading = NumberFormat::fp16; };
+      EXPECT_EQ(Shaded({at_the_sample}, computes_in_half).alpha(), 0.75);
+      EXPECT_EQ(Shaded({beside_it}, computes_in_half).out.count, 0);
+    }
+  }
 }
 
 TEST(ShaderPrecision, AlphaIsClampedWhereItIsAsked) {
