@@ -23,8 +23,6 @@ void BandwidthReservation::forget_before(Cycle cycle) {
 }
 
 void BandwidthReservation::make_room(Cycle until, Cycle present) {
-  if (!is_by_cycle() && used_.empty()) used_.resize(kept_cycles());
-  if (until <= kept_from_ + kept_cycles()) return;
   const Cycle first = oldest(present) / 64 * 64;
   if (first > kept_from_) forget_before(first);
   std::size_t words = words_.size();
@@ -39,6 +37,7 @@ void BandwidthReservation::make_room(Cycle until, Cycle present) {
     if (!used_.empty()) std::copy_n(&used(word), 64, &used_bytes[word & (64 * words - 1)]);
   }
   words_ = std::move(more);
+  last_word_ = words - 1;
   used_ = std::move(used_bytes);
 }
 
@@ -49,8 +48,8 @@ void BandwidthReservation::fill(Cycle from, Cycle to) {
 }
 
 void BandwidthReservation::begin_run(Cycle arrival, Cycle present) {
-  make_room(arrival, present);
-  const Cycle whole = end_ / per_cycle_.value();
+  if (arrival > kept_from_ + kept_cycles()) make_room(arrival, present);
+  const Cycle whole = per_cycle_.quotient(end_);
   fill(std::max(run_begin_, kept_from_), whole);
   const auto rest = static_cast<std::uint32_t>(end_ - whole * per_cycle_.value());
   if (rest > 0 && whole >= kept_from_) {
@@ -61,45 +60,39 @@ void BandwidthReservation::begin_run(Cycle arrival, Cycle present) {
   end_ = arrival * per_cycle_.value();
 }
 
-Cycle BandwidthReservation::next_with_gap(Cycle cycle) const {
-  for (; cycle < run_begin_; cycle = next_word(cycle)) {
-    const std::uint64_t free = ~word_of(cycle).full & bits(cycle, next_word(cycle));
-    if (free != 0) return std::min(run_begin_, cycle / 64 * 64 + static_cast<unsigned>(__builtin_ctzll(free)));
-  }
-  return run_begin_;
-}
-
 Cycle BandwidthReservation::take_gaps(Cycle arrival, unsigned bytes, Cycle present) {
+  const std::uint64_t width = per_cycle_.value();
   std::uint64_t left = bytes;
-  for (Cycle cycle = std::max({arrival, oldest(present), kept_from_});; ++cycle) {
-    const Cycle open = next_with_gap(cycle);
-    if (open == run_begin_) {
-      no_gap_from_ = std::min(cycle, run_begin_);
-      break;
-    }
-    cycle = open;
+  Cycle taken_until = std::max({arrival, oldest(present), kept_from_});
+  for (Cycle cycle = taken_until; cycle < run_begin_; cycle = next_word(cycle)) {
     Word& word = word_of(cycle);
-    if (is_by_cycle()) {
-      // As many as follow one another.
-      const Cycle until = std::min({run_begin_, next_word(cycle), cycle + left});
-      const std::uint64_t taken = word.full & bits(cycle, until);
-      const Cycle end = taken == 0 ? until : cycle / 64 * 64 + static_cast<unsigned>(__builtin_ctzll(taken));
-      word.full |= bits(cycle, end);
-      left -= end - cycle;
-      cycle = end - 1;
-    } else {
-      const std::uint64_t bit = bits(cycle, cycle + 1);
-      const std::uint32_t before = (word.partial & bit) != 0 ? used(cycle) : 0;
-      const auto after = static_cast<std::uint32_t>(std::min<std::uint64_t>(before + left, per_cycle_.value()));
-      left -= after - before;
-      const bool is_full = after == per_cycle_.value();
-      (is_full ? word.full : word.partial) |= bit;
-      if (!is_full) used(cycle) = after;
+    std::uint64_t open = ~word.full & bits(cycle, std::min(run_begin_, next_word(cycle)));
+    while (open != 0) {
+      const auto first = static_cast<unsigned>(__builtin_ctzll(open));
+      const std::uint64_t bit = std::uint64_t{1} << first;
+      std::uint64_t count = 1;
+      if (left >= width && (word.partial & bit) == 0) {
+        // As many as are free and follow one another.
+        const std::uint64_t beyond = ~(open & ~word.partial) & ~(bit - 1);
+        const unsigned run = (beyond == 0 ? 64 : static_cast<unsigned>(__builtin_ctzll(beyond))) - first;
+        count = std::min<std::uint64_t>(run, per_cycle_.quotient(left));
+        word.full |= ~std::uint64_t{0} >> (64 - count) << first;
+        left -= count * width;
+      } else {
+        const std::uint64_t all = left + ((word.partial & bit) != 0 ? used(cycle / 64 * 64 + first) : 0);
+        const bool is_full = all >= width;
+        (is_full ? word.full : word.partial) |= bit;
+        if (!is_full) used(cycle / 64 * 64 + first) = static_cast<std::uint32_t>(all);
+        left = is_full ? all - width : 0;
+      }
+      taken_until = cycle / 64 * 64 + first + count;
+      if (left == 0) return taken_until;
+      open &= ~word.full;
     }
-    if (left == 0) return cycle + 1;
   }
+  no_gap_from_ = std::min(taken_until, run_begin_);
   end_ += left;
-  return arrival + per_cycle_.quotient_up(end_ - arrival * per_cycle_.value());
+  return arrival + per_cycle_.quotient_up(end_ - arrival * width);
 }
 
 std::uint64_t BandwidthReservation::reserved_from(Cycle cycle) const {

@@ -100,6 +100,7 @@ SectoredCache::Line SectoredCache::allocate(std::uint64_t address, Evicted& evic
   }
   Entry& entry = lines_[line];
   entry.tag = tag;
+  entry.note = 0;
   entry.were_there = details_ ? &were_there_.of(tag) : everything_.data();
   Line& chain = chains_[chain_of(tag)];
   entry.next = chain;

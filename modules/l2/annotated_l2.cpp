@@ -111,70 +111,76 @@ std::uint64_t AnnotatedL2::write_back(const LineAccess& done, Bank& bank, Cycle 
   return moved;
 }
 
-Cycle AnnotatedL2::occupy(Bank& bank, Cycle from, Cycle begin, std::uint32_t bytes) {
-  std::uint64_t waits = 0;
-  if (begin > from) {
-    const std::uint64_t reserved = bank.time.reserved_between(from, begin);
-    waits = (begin - from) * sizes_.bank_bytes_per_cycle - reserved;
-  }
-  bank.bytes += bytes;
-  return bank.time.take(from, static_cast<unsigned>(waits) + bytes, now());
-}
-
 Cycle AnnotatedL2::pass(const MemoryRequest& access, Cycle arrival, Cycle& from) {
   const std::uint32_t index = behaviour_->bank_of(access.address);
   Bank& bank = banks_[index];
   const Cycle begin = bank.write_backs.free_from(arrival);
   const Cycle done = write(behaviour_->below_as(access), bank, begin + 1);
   const std::uint32_t cycles = behaviour_->bank_cycles(access.bytes);
-  const Cycle free_at = occupy(bank, arrival, begin, cycles * sizes_.bank_bytes_per_cycle);
+  const Cycle free_at = occupy(bank, arrival, begin, cycles);
   behaviour_->count_bank(index, access.bytes);
   from = std::max(done, free_at - cycles);
   return from + cycles;
 }
 
-Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& from) {
-  const bool writes = access.command == tlm::TLM_WRITE_COMMAND;
-  const LineAccess done = cache_.access(access.address, access.bytes, writes);
-  behaviour_->looked_up(access, static_cast<unsigned>(__builtin_popcount(done.sectors)),
-                        static_cast<unsigned>(__builtin_popcount(done.missed)));
-  const std::uint32_t index = behaviour_->bank_of(access.address);
-  Bank& bank = banks_[index];
-  Fill* const fills = &fills_[std::size_t{done.line} * cache_.organization().sectors_of_a_line()];
-  // When it has what it needs to go on.
-  Cycle begin = arrival;
-  std::uint64_t moved = access.bytes;
+AnnotatedL2::Wait AnnotatedL2::fetch(const MemoryRequest& access, const LineAccess& done, Bank& bank, Cycle arrival) {
+  const std::size_t sectors_of_a_line = cache_.organization().sectors_of_a_line();
+  Fill* const fills = &fills_[done.line * sectors_of_a_line];
+  std::uint64_t& last_there =
+      cache_.note(done.line);  // 0 before the first fill, when `fills` are of what it held before
+  Wait wait{arrival, 0, access.bytes};
+  if (done.replaced) wait.begin = bank.write_backs.free_from(wait.begin);
+  const bool waits = done.filled != 0 || (last_there > arrival && awaits(fills, done.sectors, arrival));
+  if (waits) wait.begin = bank.mshrs.free_from(wait.begin);
+  const Cycle asks = wait.begin + 1;
   if (done.replaced) {
-    begin = bank.write_backs.free_from(begin);
-    std::fill_n(fills, cache_.organization().sectors_of_a_line(), Fill());
-  }
-  const bool waits = done.filled != 0 || awaits(fills, done.sectors, arrival);
-  if (waits) begin = bank.mshrs.free_from(begin);
-  const Cycle asks = begin + 1;
-  if (done.replaced) {
-    moved += write_back(done, bank, asks);
+    wait.moved += write_back(done, bank, asks);
     behaviour_->allocated(done.line, access.origin, done.spared);
   }
+  if (done.filled != 0 && last_there == 0) std::fill_n(fills, sectors_of_a_line, Fill());
   behaviour_->for_each_run(done.address, done.filled, tlm::TLM_READ_COMMAND, access.origin,
                            [&](const MemoryRequest& read, const SectorRun& run) {
                              const Cycle there = access_below(read, asks);
                              std::fill_n(fills + run.first, run.count, Fill{asks, there});
                              counted_fills_.ask(run.count, asks, there);
-                             moved += read.bytes;
+                             last_there = std::max(last_there, there);
+                             wait.moved += read.bytes;
                            });
-  Cycle all_there = begin;
+  wait.all_there = wait.begin;
   for (std::uint32_t left = done.sectors; waits && left != 0; left &= left - 1) {
     Fill& fill = fills[__builtin_ctz(left)];
     if (fill.there == 0) continue;
     // Who ran ahead of time has asked, but this access would have been the first: it takes as long from here.
     if (asks < fill.asked) fill = {asks, asks + (fill.there - fill.asked)};
-    all_there = std::max(all_there, fill.there);
+    wait.all_there = std::max(wait.all_there, fill.there);
   }
-  if (waits) bank.mshrs.take(begin, all_there, now());
-  const std::uint32_t cycles = behaviour_->bank_cycles(moved);
-  const Cycle free_at = occupy(bank, arrival, begin, cycles * sizes_.bank_bytes_per_cycle);
-  behaviour_->count_bank(index, moved);
-  from = std::max(all_there, free_at - cycles);
+  if (waits) bank.mshrs.take(wait.begin, wait.all_there, now());
+  return wait;
+}
+
+Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& from) {
+  const bool writes = access.command == tlm::TLM_WRITE_COMMAND;
+  std::uint32_t sectors = 0;
+  SectoredCache::Line line = cache_.hit(access.address, access.bytes, writes, sectors);
+  LineAccess done;
+  const bool is_hit = line != SectoredCache::no_line;
+  if (is_hit) {
+    done.line = line;
+    done.sectors = sectors;
+  } else {
+    done = cache_.access(access.address, access.bytes, writes);
+    line = done.line;
+  }
+  behaviour_->looked_up(access, static_cast<unsigned>(__builtin_popcount(done.sectors)),
+                        static_cast<unsigned>(__builtin_popcount(done.missed)));
+  const std::uint32_t index = behaviour_->bank_of_line(line);
+  Bank& bank = banks_[index];
+  Wait wait{arrival, arrival, access.bytes};
+  if (!is_hit || cache_.note(line) > arrival) wait = fetch(access, done, bank, arrival);
+  const std::uint32_t cycles = behaviour_->bank_cycles(wait.moved);
+  const Cycle free_at = occupy(bank, arrival, wait.begin, cycles);
+  behaviour_->count_bank(index, wait.moved);
+  from = std::max(wait.all_there, free_at - cycles);
   return from + behaviour_->bank_cycles(access.bytes);
 }
 
@@ -189,12 +195,11 @@ std::vector<OccupancyPart> AnnotatedL2::parts(Cycle end) const {
     in += port->bytes_in(end);
     out += port->bytes_out(end);
   }
-  std::uint64_t banks = 0;
-  for (const Bank& bank : banks_) banks += bank.bytes - std::min(bank.bytes, bank.time.reserved_from(end));
-  const double of_banks = static_cast<double>(sizes_.bank_bytes_per_cycle) * sizes_.banks;
+  std::uint64_t cycles = 0;
+  for (const Bank& bank : banks_) cycles += bank.cycles - std::min(bank.cycles, bank.time.reserved_from(end));
   return {{"responses", 1, static_cast<double>(out) / width * ratio, true},
           {"requests", 2, static_cast<double>(in) / width * ratio, false},
-          {"banks", 0, static_cast<double>(banks) / of_banks * ratio, false}};
+          {"banks", 0, static_cast<double>(cycles) / sizes_.banks * ratio, false}};
 }
 
 }  // namespace vrpipe

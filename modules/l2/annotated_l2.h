@@ -43,19 +43,29 @@ class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private 
   };
   struct Bank {
     static std::uint32_t most(std::uint32_t places) { return std::min(places, 65535U); }
-    explicit Bank(const SectoredL2::Sizes& sizes)
-        : time(sizes.bank_bytes_per_cycle), mshrs(most(sizes.mshrs)), write_backs(most(sizes.write_backs)) {}
-    BandwidthReservation time;
+    explicit Bank(const SectoredL2::Sizes& sizes) : mshrs(most(sizes.mshrs)), write_backs(most(sizes.write_backs)) {}
+    BandwidthReservation time{1};  ///< whole cycles
     PlaceReservation mshrs, write_backs;
-    std::uint64_t bytes = 0;
+    std::uint64_t cycles = 0;  ///< in which it moves bytes
   };
   /// Whether a request needs sectors of a line that are on their way in a cycle.
   static bool awaits(const Fill* fills, std::uint32_t sectors, Cycle at);
   /// Writes what a line held that goes; returns the bytes.
   std::uint64_t write_back(const LineAccess& done, Bank& bank, Cycle at);
-  /// Keeps a bank for so many bytes from a cycle on, and for the time until `begin` before; the first in which all have
-  /// moved.
-  Cycle occupy(Bank& bank, Cycle from, Cycle begin, std::uint32_t bytes);
+  /// Keeps a bank for so many cycles from one on, and for the time until `begin` before; the first in which they are over.
+  Cycle occupy(Bank& bank, Cycle from, Cycle begin, std::uint32_t cycles) {
+    const auto waits = begin > from ? static_cast<unsigned>(begin - from - bank.time.reserved_between(from, begin)) : 0;
+    bank.cycles += cycles;
+    return bank.time.take(from, waits + cycles, now());
+  }
+  /// What a request waits for that does not find all that it needs.
+  struct Wait {
+    Cycle begin;          ///< its bank has what it needs to go on
+    Cycle all_there;      ///< its data
+    std::uint64_t moved;  ///< bytes, by its bank
+  };
+  /// Of what was looked up.
+  [[gnu::noinline]] Wait fetch(const MemoryRequest& access, const LineAccess& done, Bank& bank, Cycle arrival);
   /// The first cycle in which a request in one line has its data; `from` gets when its bank has begun on it.
   Cycle look_up(const MemoryRequest& access, Cycle arrival, Cycle& from);
   /// The same for one that goes below without a look-up, and is served when that has it.

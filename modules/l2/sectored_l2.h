@@ -159,7 +159,8 @@ class SectoredL2 final : public MemoryBehaviour {
     return writes_through_ && request.command == tlm::TLM_WRITE_COMMAND;
   }
   /// Of a piece of a request.
-  std::uint32_t bank_of(std::uint64_t address) const { return interleaving_.share(cache_.set_of(address)).place; }
+  std::uint32_t bank_of(std::uint64_t address) const { return bank_of_set(cache_.set_of(address)); }
+  std::uint32_t bank_of_line(SectoredCache::Line line) const { return bank_of_set(cache_.set_of_line(line)); }
   SectoredCache& cache() { return cache_; }
   SectoredCacheStatistics& statistics() { return statistics_; }
   /// At a port.
@@ -230,6 +231,7 @@ class SectoredL2 final : public MemoryBehaviour {
   }
 
  private:
+  std::uint32_t bank_of_set(std::uint32_t set) const { return interleaving_.share(set).place; }
   /// Whether a bank has to serve the request whatever the order of accesses is.
   bool is_certain(const MemoryRequest& request) const;
   struct OfTraffic {

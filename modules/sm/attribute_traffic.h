@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <vrpipe/arithmetic/divisor.h>
 #include <vrpipe/memory/memory_request.h>
 #include <vrpipe/memory/sectors.h>
 #include <vrpipe/pipeline/framebuffer.h>
@@ -77,8 +78,9 @@ class AttributeTraffic {
 
   /// The same request where in memory it is.
   MemoryRequest in_buffer(MemoryRequest request) const {
-    request.origin.round = static_cast<std::uint16_t>((request.address - attributes_) / buffer_bytes_);
-    request.address = in_buffer(request.address);
+    const auto [round, place] = buffer_bytes_.divide(request.address - attributes_);
+    request.origin.round = static_cast<std::uint16_t>(round);
+    request.address = attributes_ + place;
     return request;
   }
   /// For a run of sectors of a line of what a fragment warp reads, where in memory they are: attributes in the buffer.
@@ -88,7 +90,9 @@ class AttributeTraffic {
     return traffic == MemoryTraffic::attribute ? in_buffer(request) : request;
   }
   /// Where in memory an attribute is.
-  std::uint64_t in_buffer(std::uint64_t address) const { return attributes_ + (address - attributes_) % buffer_bytes_; }
+  std::uint64_t in_buffer(std::uint64_t address) const {
+    return attributes_ + buffer_bytes_.divide(address - attributes_).remainder;
+  }
   /// What a fragment warp reads; attributes are not in the buffer yet.
   void find_reads(const Warp& warp, FragmentReads& reads) const;
   /// Of these reads.
@@ -122,7 +126,7 @@ class AttributeTraffic {
 
   const RenderContext& context_;
   const std::uint32_t attribute_bytes_;
-  const std::uint32_t buffer_bytes_;  ///< whole lines
+  const Divisor buffer_bytes_;  ///< whole lines
   std::uint64_t attributes_;
   std::uint64_t color_;
   const std::uint32_t quad_bytes_;  ///< of the colour target

@@ -24,7 +24,8 @@ class BandwidthReservation {
   static constexpr Cycle remembered_cycles = 64;
 
   /// @param bytes_per_cycle not 0
-  explicit BandwidthReservation(unsigned bytes_per_cycle) : per_cycle_(bytes_per_cycle) {}
+  explicit BandwidthReservation(unsigned bytes_per_cycle)
+      : per_cycle_(bytes_per_cycle), used_(bytes_per_cycle == 1 ? 0 : kept_cycles()) {}
 
   unsigned bytes_per_cycle() const { return static_cast<unsigned>(per_cycle_.value()); }
 
@@ -43,29 +44,25 @@ class BandwidthReservation {
   /// And before the beginning of another.
   std::uint64_t reserved_between(Cycle from, Cycle to) const;
   /// Cycles for which there is room, for tests.
-  std::size_t kept_cycles() const { return 64 * words_.size(); }
+  std::size_t kept_cycles() const { return 64 * (last_word_ + 1); }
 
  private:
   /// All before the cycle that is not reserved yet is a gap.
   [[gnu::noinline]] void begin_run(Cycle arrival, Cycle present);
   [[gnu::noinline]] Cycle take_gaps(Cycle arrival, unsigned bytes, Cycle present);
-  void make_room(Cycle until, Cycle present);
+  [[gnu::noinline]] void make_room(Cycle until, Cycle present);
   void forget_before(Cycle cycle);
   void fill(Cycle from, Cycle to);
-  /// The first from `cycle` on, and before the run, of which something is free; the run's first if there is none.
-  Cycle next_with_gap(Cycle cycle) const;
   static Cycle oldest(Cycle present) { return present - (present < remembered_cycles ? present : remembered_cycles); }
   /// Of 64 cycles.
   struct Word {
     std::uint64_t full = 0;     ///< a bit each
     std::uint64_t partial = 0;  ///< of these `used_` says how much
   };
-  Word& word_of(Cycle cycle) { return words_[cycle / 64 & (words_.size() - 1)]; }
-  const Word& word_of(Cycle cycle) const { return words_[cycle / 64 & (words_.size() - 1)]; }
-  std::uint32_t& used(Cycle cycle) { return used_[cycle & (64 * words_.size() - 1)]; }
-  std::uint32_t used(Cycle cycle) const { return used_[cycle & (64 * words_.size() - 1)]; }
-  /// Whether a cycle has one byte, so that it is full or free.
-  bool is_by_cycle() const { return per_cycle_.value() == 1; }
+  Word& word_of(Cycle cycle) { return words_[cycle / 64 & last_word_]; }
+  const Word& word_of(Cycle cycle) const { return words_[cycle / 64 & last_word_]; }
+  std::uint32_t& used(Cycle cycle) { return used_[cycle & (64 * last_word_ + 63)]; }
+  std::uint32_t used(Cycle cycle) const { return used_[cycle & (64 * last_word_ + 63)]; }
 
   Divisor per_cycle_;
   std::uint64_t end_ = 0;  ///< in bytes from the start of time: of the furthest reservation
@@ -74,7 +71,8 @@ class BandwidthReservation {
   Cycle kept_from_ = 0;    ///< cycles from here to `run_begin_` are kept; a multiple of 64
   // Rings, by cycle. Beyond `run_begin_` words are 0.
   std::vector<Word> words_ = std::vector<Word>(16);
-  std::vector<std::uint32_t> used_;  ///< bytes, where a cycle has several
+  std::size_t last_word_ = 15;       ///< of the ring, whose size is a power of two
+  std::vector<std::uint32_t> used_;  ///< bytes; none where a cycle has one, so that it is full or free
 };
 
 }  // namespace vrpipe

@@ -53,6 +53,10 @@ class SectoredCache {
   }
   /// Of a line that is held: the first byte of what it holds.
   std::uint64_t address(Line line) const { return lines_[line].tag << line_shift_; }
+  /// The set of a line.
+  std::uint32_t set_of_line(Line line) const { return lines_[line].set; }
+  /// A number that whoever looks lines up keeps with a line; 0 once it is allocated. It comes to the host's cache with the tag.
+  std::uint64_t& note(Line line) { return lines_[line].note; }
   /// Whether a line can be had for an address that is not held: its set has one that is free or not pinned.
   bool can_allocate(std::uint64_t address) const { return sets_[set_of(address)].pinned < ways_; }
   /// What a line held before.
@@ -171,6 +175,20 @@ class SectoredCache {
     }
     if (shadow_ != nullptr) follow(access.address, access.sectors);
   }
+  /// All at once for bytes of a line, as one access, if all of their sectors are there; else nothing, and `access` is to be called.
+  /// `sectors` gets those needed. Returns the line, or `no_line`.
+  Line hit(std::uint64_t address, std::uint32_t bytes, bool writes, std::uint32_t& sectors) {
+    if (shadow_ != nullptr) return no_line;
+    const Line line = find(address);
+    if (line == no_line) return no_line;
+    Entry& entry = lines_[line];
+    sectors = touched(static_cast<unsigned>(address) & (organization_.line_bytes - 1), bytes);
+    if ((sectors & ~entry.present) != 0) return no_line;
+    if (writes) entry.dirty |= sectors;
+    use(line);
+    hit(static_cast<unsigned>(__builtin_popcount(sectors)));
+    return line;
+  }
   /// All at once for bytes of a line, as one access.
   LineAccess access(std::uint64_t address, std::uint32_t bytes, bool writes);
 
@@ -204,6 +222,7 @@ class SectoredCache {
     Line next = no_line;  ///< of the chain
     std::uint32_t set = 0;
     std::uint32_t* were_there = nullptr;  ///< sectors of what it holds, so far
+    std::uint64_t note = 0;
   };
   struct Set {
     Line newest = no_line;  ///< lru: of the lines that are not pinned, by use; fifo: of all, by allocation
