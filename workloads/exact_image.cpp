@@ -231,9 +231,11 @@ class BoundPrecision {
            BoundOnItsWay& pixel) const {
     const double off = error_of_alpha(splat, sample);
     const bool is_exactly_there = sample.is_visible();
-    const bool is_certain = is_exactly_there ? sample.weight - off >= drawn_.pruning_threshold
-                                             : sample.weight + off < drawn_.pruning_threshold;
-    if (!is_exactly_there && is_certain) return;
+    const bool may_be_there = sample.weight + off >= drawn_.pruning_threshold;
+    const bool may_be_missing = sample.weight - off < drawn_.pruning_threshold ||
+                                std::max(std::fabs(sample.u), std::fabs(sample.v)) > drawn_.sigmas_covered;
+    if (!is_exactly_there && !may_be_there) return;
+    const bool is_certain = is_exactly_there && !may_be_missing;
     const double alpha = is_exactly_there ? std::min(kLargestAlpha, sample.weight) : 0.0;
     // What is blended on one side alone is off by all of it.
     const double sent = is_certain ? off : sample.weight + off;

@@ -187,6 +187,21 @@ TEST(Bounds, HoldForSplatsWhoseInverseNoHalfHolds) {
   EXPECT_GT(tightest(draw_of(20, 20, std::move(specks)), all), 0.01);
 }
 
+TEST(Bounds, HoldForBoxesThatEndAtThreeSigmas) {
+  std::vector<Drawn> all;
+  for (const char* variant : {"baseline", "het+qm"}) {
+    all.push_back(drawn(variant, ColorFormat::rgba32f, {{"state", "splat_extent", "three_sigma"}}));
+    all.back().precision.sigmas_covered = 3;
+  }
+  EXPECT_GT(tightest(random_draw(96, 64, 1500, 3), all), 0.1);
+  // One alone, whose alpha at three sigmas is 0.0111: what is left out is all that is off.
+  std::vector<Splat> alone{round_splat(24.5F, 24.5F, 7, 0.99F)};
+  EXPECT_GT(tightest(draw_of(48, 48, alone), all), 0.99);
+  all.front().precision.sigmas_covered = 3.2;
+  const BoundedImage too_little = render_with_bounds(draw_of(48, 48, alone), {all.front().precision});
+  EXPECT_LT(too_little.bounds[0][24 * 48 + 24 + 22].alpha, 1e-4) << "3.14 sigmas out";
+}
+
 TEST(Bounds, CountEachPixelsFragments) {
   const Draw draw = draw_of(4, 4, std::vector<Splat>(7, flat_box(-4, -4, 12, 12, 0.5F)));
   const BoundedImage bounded = render_with_bounds(draw, {});

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <memory>
 #include <utility>
 
@@ -128,40 +129,61 @@ struct Reference {
   std::vector<std::vector<double>> proved;  ///< of each run, of each pixel as it is shown; empty where nothing is
 };
 
+/// Runs that draw the same splats, by their indices, and the precision that a bound is proved by.
+using ProvedRuns = std::vector<std::pair<std::size_t, DrawnPrecision>>;
+
+/// The exact image of a draw as it is shown; adds what is proved of runs that draw it. `reference`, if it is another draw's: then a
+/// pixel is off by what the exact images differ, and by what the run is off its own.
+ShownImage prove(const Draw& draw, const ProvedRuns& runs, const std::array<float, 3>& background,
+                 const ShownImage* reference, BoundedImage& bounded, std::vector<std::vector<double>>& proved) {
+  std::vector<DrawnPrecision> precisions;
+  for (const auto& [run, precision] : runs) precisions.push_back(precision);
+  bounded = render_with_bounds(draw, precisions);
+  ShownImage own = shown(bounded.exact, background);
+  // What alpha lets through is background.
+  const double brightest = *std::max_element(background.begin(), background.end());
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    std::vector<double>& of_run = proved[runs[i].first];
+    for (std::size_t pixel = 0; pixel < bounded.bounds[i].size(); ++pixel) {
+      double apart = 0;
+      for (std::size_t value = 3 * pixel; reference != nullptr && value < 3 * pixel + 3; ++value)
+        apart = std::max(apart, std::fabs(own.rgb[value] - reference->rgb[value]));
+      const PixelBound& bound = bounded.bounds[i][pixel];
+      of_run.push_back(std::min(1.0, apart + bound.color + brightest * bound.alpha));
+    }
+  }
+  return own;
+}
+
 Reference make_reference(const AccuracyJob& job, const Workload& workload,
                          const std::vector<PrecisionSettings>& settings, AccuracyResult& result) {
   const Stopwatch watch;
-  std::vector<DrawnPrecision> precisions;
-  std::vector<std::size_t> runs;
+  const PreprocessOptions exact = workload.options.exact();
+  std::map<PreprocessOptions, ProvedRuns> runs;
   for (std::size_t i = 0; i < settings.size(); ++i) {
-    // Nothing is proved of other splats than the exact image's.
-    if (!workload.scene.draw_list && !(settings[i].preprocess == workload.options.exact())) continue;
     const std::optional<DrawnPrecision> precision = drawn_precision(settings[i].request);
-    if (!precision) continue;
-    precisions.push_back(*precision);
-    runs.push_back(i);
+    if (precision) runs[workload.scene.draw_list ? exact : settings[i].preprocess].emplace_back(i, *precision);
   }
-  const BoundedImage bounded = render_with_bounds(*workload.draw_with(workload.options.exact()), precisions);
-  const ExactImage& exact = bounded.exact;
-  result.reference_seconds = watch.seconds();
+  Reference reference;
+  reference.proved.resize(settings.size());
+  const auto& background = job.simulation.background;
+  BoundedImage bounded;
+  reference.image = prove(*workload.draw_with(exact), runs[exact], background, nullptr, bounded, reference.proved);
+  reference.fragments = std::move(bounded.fragments);
   if (job.simulation.output) {
-    SharedImage image(exact.width, exact.height);
+    SharedImage image(bounded.exact.width, bounded.exact.height);
     float* value = image.values();
-    for (const std::array<double, 4>& pixel : exact.rgba) {
+    for (const std::array<double, 4>& pixel : bounded.exact.rgba) {
       value = std::transform(pixel.begin(), pixel.end(), value, [](double x) { return static_cast<float>(x); });
     }
     write_image(job, result, reference_name, image);
   }
-  Reference reference{shown(exact, job.simulation.background), bounded.fragments, {}};
   if (job.html) result.reference = picture_of(reference.image, reference_width);
-  const auto& background = job.simulation.background;
-  const double brightest = *std::max_element(background.begin(), background.end());
-  reference.proved.resize(settings.size());
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    // What alpha lets through is background.
-    for (const PixelBound& bound : bounded.bounds[i])
-      reference.proved[runs[i]].push_back(std::min(1.0, bound.color + brightest * bound.alpha));
+  for (const auto& [options, of_draw] : runs) {
+    if (!(options == exact))
+      prove(*workload.draw_with(options), of_draw, background, &reference.image, bounded, reference.proved);
   }
+  result.reference_seconds = watch.seconds();
   return reference;
 }
 
@@ -169,6 +191,13 @@ Reference make_reference(const AccuracyJob& job, const Workload& workload,
 std::string file_name(std::string run) {
   std::replace(run.begin(), run.end(), '=', '-');
   return run;
+}
+
+using ChosenValues = std::vector<std::pair<std::string, std::string>>;
+std::string name_of_values(const ChosenValues& values) {
+  std::string name;
+  for (const auto& [knob, value] : values) name += (name.empty() ? "" : ",") + knob + "=" + value;
+  return name;
 }
 
 /// All images that a job may write; values that are not tried are among them.
@@ -179,6 +208,8 @@ std::vector<std::string> images_of(const AccuracyJob& job) {
     for (const std::string& value : knob.values)
       images.push_back(image_name(scene, file_name(knob.name + "=" + value)));
   }
+  for (const ChosenValues& values : precision_crossings())
+    images.push_back(image_name(scene, file_name(name_of_values(values))));
   return images;
 }
 
@@ -381,7 +412,7 @@ std::vector<PrecisionSettings> choose_values(const AccuracyJob& job, bool is_dra
   if (job.quick || !result.base.variant.is_of_pipeline()) return settings;
   for (const auto& values : precision_crossings()) {
     PrecisionSettings crossed = settings.front();
-    std::vector<std::pair<std::string, std::string>> changed;
+    ChosenValues changed;
     for (const auto& [name, value] : values) {
       const auto knob = std::find_if(precision_knobs().begin(), precision_knobs().end(),
                                      [&, name = name](const PrecisionKnob& each) { return each.name == name; });
@@ -399,8 +430,7 @@ std::vector<PrecisionSettings> choose_values(const AccuracyJob& job, bool is_dra
     if (run < settings.size()) continue;
     settings.push_back(std::move(crossed));
     result.runs.emplace_back();
-    for (const auto& [name, value] : changed)
-      result.runs.back().name += (result.runs.back().name.empty() ? "" : ",") + name + "=" + value;
+    result.runs.back().name = name_of_values(changed);
   }
   return settings;
 }
@@ -437,7 +467,12 @@ void climb_precisions(const AccuracyJob& job, const Workload& workload, const st
       run.picture = picture_of(image, picture_width);
       run.error_map = error_map(image, reference.image, picture_width);
     }
-    if (job.simulation.output && index < single) write_image(job, result, file_name(run.name), *simulated.image);
+    if (!job.simulation.output) return;
+    // What several choices come to is called by all of them, whatever the default is.
+    const auto crossed = std::find_if(result.crossed.begin(), result.crossed.end(),
+                                      [&](const CrossedRow& row) { return index >= single && row.run == index; });
+    const std::string name = crossed == result.crossed.end() ? run.name : name_of_values(crossed->values);
+    write_image(job, result, file_name(name), *simulated.image);
   });
 
   std::vector<TradeOff> trade_offs;

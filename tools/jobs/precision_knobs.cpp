@@ -170,8 +170,7 @@ bool can_round(const PrecisionSettings& settings) {
 std::optional<DrawnPrecision> drawn_precision(const RunRequest& request) {
   const DrawState state = draw_state_of(request);
   const double visible = 1.0 / 255.0;
-  const bool is_cut =
-      state.splat_extent == SplatExtent::three_sigma || state.obb_padding < 0.7072F || state.obb_padding > 1.0F;
+  const bool is_cut = state.obb_padding < 0.7072F || state.obb_padding > 1.0F;
   // Without pruning a larger box has more fragments.
   const bool is_wider =
       state.splat_extent != SplatExtent::oriented_box && static_cast<double>(state.pruning_threshold) < 0.999 * visible;
@@ -184,6 +183,7 @@ std::optional<DrawnPrecision> drawn_precision(const RunRequest& request) {
   drawn.device = device_precision_of(request);
   drawn.merges = request.variant.quad_merging;
   drawn.pruning_threshold = static_cast<double>(state.pruning_threshold);
+  if (state.splat_extent == SplatExtent::three_sigma) drawn.sigmas_covered = 3;
   if (request.variant.early_termination) drawn.termination_threshold = static_cast<double>(state.termination_threshold);
   return drawn;
 }

@@ -39,8 +39,8 @@ const std::vector<PrecisionKnob>& precision_knobs();
 /// Whether the model knows how to round to the format: as measured it does for some.
 bool can_round(const PrecisionSettings& settings);
 
-/// By which a bound on the error of a run is proved; none where there is no proof: boxes that cut off what is visible, units of one's
-/// own, or no pipeline.
+/// By which a bound on the error of a run is proved; none where there is no proof: boxes that are padded otherwise than they have
+/// to be, units of one's own, or no pipeline.
 std::optional<DrawnPrecision> drawn_precision(const RunRequest& request);
 
 /// Values of several knobs at once, KNOB and VALUE, of those that depend on one another: how a target of few bits rounds, how often it does,

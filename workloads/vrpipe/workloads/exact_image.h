@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -38,6 +39,8 @@ struct DrawnPrecision {
   bool merges = false;
   double pruning_threshold = 1.0 / 255.0;
   std::optional<double> termination_threshold;  ///< none: no pixel terminates
+  /// Along either axis: samples farther out may be left out.
+  double sigmas_covered = std::numeric_limits<double>::infinity();
 };
 
 /// What render_exactly() gives, and how far a pipeline's image may be from it.
@@ -48,7 +51,7 @@ struct BoundedImage {
 };
 
 /// A pipeline that draws the same splats, covers the same samples (boxes padded, F5) and evaluates alpha from half axes in single
-/// precision is within these bounds: of the shader's alpha, of fragments that it may prune or not, of blending (F4), and of what is behind
+/// precision is within these bounds: of the shader's alpha, of fragments that it may prune or not, or leave out far from the centre, of blending (F4), and of what is behind
 /// a pixel that may have terminated. docs/numerics.md has the proof. Colours are clamped where the format clamps.
 /// @throws std::invalid_argument as render_exactly()
 BoundedImage render_with_bounds(const Draw& draw, const std::vector<DrawnPrecision>& precisions, unsigned threads = 0);
