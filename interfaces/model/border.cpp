@@ -69,7 +69,11 @@ void Border::make_room(const char* who) {
   }
   if (const Cycle next = next_edge(); next != never) return advance(next + 1);
   // It waits for what is on its way in others, as for a mark that is to come around.
-  if (!step_locals()) throw SimulationFault(who, now(), "an item is offered, and the unit is at rest");
+  if (!step_locals())
+    throw SimulationFault(who, now(),
+                          "an item is offered, and the unit is at rest: it waits for another unit at cycle, which "
+                          "waits for it by way of units at lt; "
+                          "simulate fewer units at cycle, or those between them as well");
 }
 
 void Border::advance_for(Cycle until, const std::function<bool()>& is_enough) {
