@@ -126,8 +126,8 @@ Cycle AnnotatedL2::pass(const MemoryRequest& access, Cycle arrival, Cycle& from)
 AnnotatedL2::Wait AnnotatedL2::fetch(const MemoryRequest& access, const LineAccess& done, Bank& bank, Cycle arrival) {
   const std::size_t sectors_of_a_line = cache_.organization().sectors_of_a_line();
   Fill* const fills = &fills_[done.line * sectors_of_a_line];
-  std::uint64_t& last_there =
-      cache_.note(done.line);  // 0 before the first fill, when `fills` are of what it held before
+  // 0 before the first fill: till then `fills` are of what the line held before.
+  std::uint64_t& last_there = cache_.note(done.line);
   Wait wait{arrival, 0, access.bytes};
   if (done.replaced) wait.begin = bank.write_backs.free_from(wait.begin);
   const bool waits = done.filled != 0 || (last_there > arrival && awaits(fills, done.sectors, arrival));
