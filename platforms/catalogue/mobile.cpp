@@ -9,7 +9,8 @@ namespace vrpipe {
 Platform mobile() {
   Platform platform;
   platform.name = "mobile";
-  platform.description = "a phone-sized GPU: 1 GPC, 4 cores, 800 MHz, 1 quad a cycle of RGBA16F, small bins and cache";
+  platform.description =
+      "a phone-sized GPU: 1 GPC, 4 cores, 800 MHz, 1 quad a cycle of RGBA16F, small bins and cache, an ideal L2";
   platform.gpcs = 1;
   platform.frequency_mhz = 800;
   platform.settings = {

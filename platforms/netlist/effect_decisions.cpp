@@ -61,6 +61,17 @@ How how_omitted(const std::string& name, const EffectDecision& decision, const E
   return How::proved;
 }
 
+/// Whether all effects are omitted that a part of the netlist is there for.
+bool has_nothing_to_do(OmittedEffects& omitted, const std::string& part) {
+  bool any = false;
+  for (const Effect& effect : vrpipe::effects()) {
+    if (std::find(effect.parts.begin(), effect.parts.end(), part) == effect.parts.end()) continue;
+    if (omitted.find(effect.full_name()) == nullptr) return false;
+    any = true;
+  }
+  return any;
+}
+
 /// Throws UserError for a memory that is called for and was left out by force: what is bound to it would wait for nothing.
 void check_memories(const std::shared_ptr<OmittedEffects>& omitted) {
   RenderContext context;
@@ -148,8 +159,13 @@ void Configuration::decide_effects() {
   }
   for (EffectReport& report : effects_) {
     const Effect& effect = effect_named(report.name);
-    if (effect.decide == nullptr && !omitted->has_part(effect.component))
+    if (effect.decide != nullptr) continue;
+    if (!omitted->has_part(effect.component)) {
       report = {report.name, true, EffectProof::by_facts, effect.component + " is left out"};
+    } else if (has_nothing_to_do(*omitted, effect.component)) {
+      report = {report.name, true, EffectProof::by_facts,
+                effect.component + " is there to be looked at, and has nothing to do"};
+    }
   }
   std::sort(effects_.begin(), effects_.end(),
             [](const EffectReport& a, const EffectReport& b) { return a.name < b.name; });
@@ -232,7 +248,8 @@ std::vector<EffectReport> Configuration::effects() const {
     if (omitted == nullptr || omitted->how != How::watched) continue;
     if (omitted->uses > 0) {
       report.omitted = false;
-      report.reason += fmt::format(": called for {} time{}", omitted->uses, omitted->uses == 1 ? "" : "s");
+      // Once: it may have been taken in then, and not asked for again.
+      report.reason += omitted->uses == 1 ? ": called for" : fmt::format(": called for {} times", omitted->uses);
     } else {
       report.reason += ": never called for";
     }

@@ -46,6 +46,21 @@ TEST(Observers, SeveralSeeOneLink) {
   }
 }
 
+TEST(Observers, ChangeNoDecisionOfWhatAFrameCallsFor) {
+  const Draw draw = random_draw(40, 30, 20, 1);
+  const auto active = [](const RunResult& result) {
+    std::vector<std::string> names;
+    for (const EffectReport& effect : result.effects) {
+      if (!effect.omitted) names.push_back(effect.name);
+    }
+    return names;
+  };
+  for (const char* variant : {"baseline", "het+qm"}) {
+    EXPECT_EQ(active(run(observed(variant, Fidelity::lt), draw)), active(run(request_of(variant, Fidelity::lt), draw)))
+        << variant << ": units that are there to be looked at alone have nothing to do";
+  }
+}
+
 TEST(Observers, SeePlacesOfAQueueTakenAndFree) {
   const Draw draw = random_draw(150, 90, 300, 9);
   for (const Fidelity fidelity : fidelities_with_time()) {

@@ -109,6 +109,10 @@ TEST_F(CommandLine, ScenesPlatformsAndUnitsListEverything) {
     EXPECT_EQ(platforms_json["platforms"][i]["name"], platforms()[i].name);
     EXPECT_EQ(platforms_json["platforms"][i]["gpcs"], platforms()[i].gpcs);
   }
+  expect_in(text, {"memory: l2 (sectored-cache) for crop, sm, zrop; dram (lpddr3-1600) for l2",
+                   "memory: l2 (fixed-latency) for crop\n"});
+  EXPECT_EQ(platforms_json["platforms"][0]["memories"][1],
+            (nlohmann::json{{"path", "dram"}, {"implementation", "lpddr3-1600"}, {"serves", {"l2"}}}));
 
   const std::string units = vrpipe({"units"}).out;
   const std::string markdown = vrpipe({"units", "--markdown"}).out;

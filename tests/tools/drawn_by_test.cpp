@@ -218,7 +218,8 @@ TEST_F(DrawnBy, ReportsAndPagesHaveRunsWithoutQuads) {
   arguments.insert(arguments.end(), all_that_draw.begin(), all_that_draw.end());
   const Finished finished = vrpipe(arguments);
   ASSERT_EQ(finished.code, 0) << finished.err;
-  for (const char* part : {"RENDER", "speed-up over baseline", "quads", "energy, mJ"})
+  for (const char* part : {"RENDER", "speed-up over baseline", "quads", "energy, mJ",
+                           "software: its cycles have the sorting of splats among them"})
     EXPECT_NE(finished.out.find(part), std::string::npos) << part;
   EXPECT_EQ(finished.out.find("nan"), std::string::npos);
   EXPECT_NE(read_file(folder() / "page.html").find(">Over time<"), std::string::npos) << "of the pipelines";
@@ -226,6 +227,7 @@ TEST_F(DrawnBy, ReportsAndPagesHaveRunsWithoutQuads) {
   ASSERT_EQ(alone.code, 0) << alone.err;
   EXPECT_EQ(alone.out.find("\nquads"), std::string::npos);
   EXPECT_NE(alone.out.find("unit cycles"), std::string::npos);
+  EXPECT_NE(alone.out.find("colour and termination of its own"), std::string::npos) << "--format says nothing of it";
   const Finished views = vrpipe({"compare", "--views", "2", "--size", "32x24", "--fovy", "10", "--fidelity", "lt",
                                  "--variant", "baseline", "--variant", "software", "--set", "preprocess.sh_degree=0"});
   ASSERT_EQ(views.code, 0) << views.err;

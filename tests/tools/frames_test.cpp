@@ -319,7 +319,7 @@ TEST_F(Frames, TheTableHasEveryPath) {
   EXPECT_EQ(finished.code, 0) << finished.err;
   for (const char* part :
        {"software (published)", "hardware (baseline)", "in-shader (ordered lock)", "vr-pipe (het+qm)",
-        "accelerator (gscore)", "3.95 mm2", "preprocess", "millijoules", "mJ at 8 nm", "over hardware", "in flight",
+        "accelerator (gscore)", "3.95 mm2", "preprocess", "millijoules", "mJ at 8 nm", "hardware is 1", "in flight",
         "warp iterations", "a draw list is preprocessed already", "result: frames.json"}) {
     EXPECT_NE(finished.out.find(part), std::string::npos) << part << " is not in\n" << finished.out;
   }
@@ -399,7 +399,7 @@ TEST_F(Frames, OfManyViewsAreThoseOfEach) {
   printed.insert(printed.end(), small.begin(), small.end());
   const Finished text = vrpipe(printed);
   EXPECT_EQ(text.code, 0) << text.err;
-  for (const char* part : {"2 views round the scene", "over hardware: least", "accelerator (gscore)"})
+  for (const char* part : {"2 views round the scene", "hardware is 1: least", "accelerator (gscore)"})
     EXPECT_NE(text.out.find(part), std::string::npos) << part << " is not in\n" << text.out;
   refused({"frames", "--scene", "tiny.spl", "--views", "2"}, {"--scene", "a draw list"});
   refused({"frames", "--views", "2", "--html", "page.html"}, {"--html", "one view"});

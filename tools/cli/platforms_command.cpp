@@ -1,6 +1,13 @@
+#include <algorithm>
+#include <string>
+#include <vector>
+
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
+#include <vrpipe/pipeline/registry.h>
+#include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/simulation.h>
 
 #include "cli/command_line.h"
@@ -11,6 +18,31 @@
 
 namespace vrpipe::tools {
 namespace {
+
+struct Memory {
+  std::string path;
+  std::string implementation;
+  std::vector<std::string> serves;  ///< units, or memories above, without their GPC
+};
+
+std::vector<Memory> memories_of(const Platform& platform) {
+  Netlist netlist(platform.gpcs);
+  platform.wire(netlist);
+  std::vector<Memory> memories;
+  for (const Instance& instance : netlist.instances()) {
+    if (!Netlist::is_memory(instance)) continue;
+    const Slot& slot = Registry::instance().slot(instance.slot);
+    Memory& memory = memories.emplace_back();
+    memory.path = instance.path;
+    memory.implementation = instance.implementation.empty() ? slot.implementation : instance.implementation;
+    for (const std::string& path : netlist.bound_to(instance.path)) {
+      const std::string unit = without_gpc(path);
+      if (std::find(memory.serves.begin(), memory.serves.end(), unit) == memory.serves.end())
+        memory.serves.push_back(unit);
+    }
+  }
+  return memories;
+}
 
 class PlatformsCommand : public Command {
  public:
@@ -46,16 +78,26 @@ class PlatformsCommand : public Command {
         }
       }
       if (!line.empty()) settings += "    " + line + "\n";
+      Json memories = Json::array();
+      std::string memory_text;
+      for (const Memory& memory : memories_of(platform)) {
+        memory_text += fmt::format("{}{} ({}) for {}", memory_text.empty() ? "" : "; ", memory.path,
+                                   memory.implementation, fmt::join(memory.serves, ", "));
+        memories.push_back(
+            {{"path", memory.path}, {"implementation", memory.implementation}, {"serves", memory.serves}});
+      }
       list.push_back({{"name", platform.name},
                       {"description", platform.description},
                       {"default", is_default},
                       {"gpcs", platform.gpcs},
                       {"frequency_mhz", platform.frequency_mhz},
+                      {"memories", std::move(memories)},
                       {"parameters", std::move(differs)}});
       text +=
           fmt::format("{}{}\n  {}\n", style.bold(platform.name), is_default ? " (default)" : "", platform.description);
       text +=
           fmt::format("  {} GPC{}, {:g} MHz\n", platform.gpcs, platform.gpcs == 1 ? "" : "s", platform.frequency_mhz);
+      text += "  memory: " + memory_text + "\n";
       text += settings.empty() ? "  every parameter at its unit's default\n"
                                : "  differs from the units' defaults in\n" + settings;
     }

@@ -79,7 +79,7 @@ std::string energy_notes(const FramesResult& result) {
 
 /// Nothing where no path has any.
 std::string energies_text(const FramesResult& result, const TextStyle& style) {
-  TextTable table({"millijoules", "preprocess", "sort", "raster", "frame", "low to high", "over hardware"});
+  TextTable table({"millijoules", "preprocess", "sort", "raster", "frame", "low to high", "hardware is 1"});
   const auto nominal = [](const std::optional<Range>& range) { return range ? three_digits(range->nominal) : "-"; };
   bool has_any = false;
   for (const FramePath& path : result.paths) {
@@ -99,7 +99,7 @@ std::string frames_report(const FramesResult& result, const TextStyle& style) {
                                  grouped(result.scene.gaussians_visible), result.width, result.height);
   text += machine_text(result.runs.front().request, style) + "\n";
   TextTable table(
-      {"milliseconds", "preprocess", "sort", "raster", "frame", "over hardware", "in flight", "off by, %", "bound by"});
+      {"milliseconds", "preprocess", "sort", "raster", "frame", "hardware is 1", "in flight", "off by, %", "bound by"});
   table.left(8);
   const auto hardware = std::find_if(result.paths.begin(), result.paths.end(),
                                      [](const FramePath& path) { return path.path == "hardware"; });
@@ -112,7 +112,13 @@ std::string frames_report(const FramesResult& result, const TextStyle& style) {
                path.expected_error_percent ? fmt::format("{:g}", *path.expected_error_percent) : "-",
                path.bound_by.empty() ? "-" : printable(path.bound_by)});
   }
-  text += table.text(style) + "\n" + energies_text(result, style);
+  if (hardware->frame) {
+    text += table.text(style) + "\n";
+  } else {
+    text += fmt::format("{} has no time: nothing is told of how long frames take\n\n",
+                        vrpipe::name_of(result.runs.front().request.fidelity));
+  }
+  text += energies_text(result, style);
   if (hardware->frame)
     text +=
         "in flight: the least from frame to frame, the next prepared beside the draw of this one, as the SM array, "
@@ -137,7 +143,7 @@ std::string frames_report(const FrameViewsResult& result, const TextStyle& style
   text += result.camera_file ? fmt::format(", of {} cameras in {}\n", result.cameras, printable(*result.camera_file))
                              : std::string(" round the scene\n");
   text += machine_text(first.runs.front().request, style) + "\n";
-  TextTable table({"frame, milliseconds", "least", "median", "most", "over hardware: least", "median", "most",
+  TextTable table({"frame, milliseconds", "least", "median", "most", "hardware is 1: least", "median", "most",
                    "in view least, most"});
   for (std::size_t i = 0; i < first.paths.size(); ++i) {
     const FramePath& path = first.paths[i];

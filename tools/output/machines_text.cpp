@@ -16,6 +16,8 @@ namespace {
 std::string common_text(const RunRequest& request, const std::vector<Setting>& preprocessing, std::uint32_t passes) {
   std::string text = fmt::format("{} fidelity, {} colour, {} termination", fidelity_of(request),
                                  vrpipe::name_of(request.format), name_of(request.termination));
+  if (!request.variant.is_of_pipeline())
+    text = fmt::format("{} fidelity, colour and termination of its own", vrpipe::name_of(request.fidelity));
   if (passes > 1) text += fmt::format(", {} passes", passes);
   text += effects_choice_text(request);
   for (const std::vector<Setting>* settings : {&request.settings, &preprocessing}) {
@@ -48,7 +50,10 @@ std::string machines_text(const std::vector<RunResult>& runs, const std::vector<
     const Platform& platform = *run.request.platform;
     if (is_first(platform.name, platforms)) text += platform_line(platform, style);
   }
-  RunRequest common = runs.front().request;
+  // What draws otherwise is not asked for a format or a termination.
+  const auto of_pipeline =
+      std::find_if(runs.begin(), runs.end(), [](const RunResult& run) { return run.request.variant.is_of_pipeline(); });
+  RunRequest common = (of_pipeline == runs.end() ? runs.front() : *of_pipeline).request;
   common.fidelity = finest_fidelity_of(runs);
   text += common_text(common, preprocessing, passes);
   for (const RunResult& run : runs) {

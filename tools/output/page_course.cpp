@@ -20,11 +20,11 @@ namespace {
 struct CourseSlice {
   std::uint64_t from = 0, to = 0;  ///< cycles, `to` excluded
   std::vector<UnitShares> units;
-  std::string bottleneck = {};  ///< a unit; empty where none does anything
+  std::string most_engaged = {};  ///< a unit; empty where none does anything
 };
 
-/// Says which unit bounds each slice: one that does so goes on until another does so clearly more.
-void find_bottlenecks(std::vector<CourseSlice>& slices) {
+/// Says which unit is the most engaged in each slice: one that is goes on until another is so clearly more.
+void find_most_engaged(std::vector<CourseSlice>& slices) {
   constexpr double clearly = 0.02;
   std::string last;
   for (CourseSlice& slice : slices) {
@@ -36,8 +36,8 @@ void find_bottlenecks(std::vector<CourseSlice>& slices) {
       if (unit.unit == last) before = &unit;
     }
     if (before != nullptr && engaged(*before) + clearly >= engaged(*found)) found = before;
-    if (found != nullptr && engaged(*found) > 0) slice.bottleneck = found->unit;
-    last = slice.bottleneck;
+    if (found != nullptr && engaged(*found) > 0) slice.most_engaged = found->unit;
+    last = slice.most_engaged;
   }
 }
 
@@ -54,7 +54,7 @@ std::vector<CourseSlice> slices_of(const RunResult& run, std::uint64_t longest) 
     if (to <= intervals.from[begin]) continue;
     slices.push_back({intervals.from[begin], to, unit_shares(intervals, begin, end)});
   }
-  find_bottlenecks(slices);
+  find_most_engaged(slices);
   return slices;
 }
 
@@ -111,14 +111,14 @@ std::string unit_areas(const std::string& id, const RunResult& run, const std::v
   return text;
 }
 
-/// Which unit bounds, one piece for as long as it is the same.
-std::string bottleneck_strip(const RunResult& run, const std::vector<CourseSlice>& slices, const CourseScale& scale,
-                             double top) {
+/// Which unit is the most engaged, one piece for as long as it is the same.
+std::string engaged_strip(const RunResult& run, const std::vector<CourseSlice>& slices, const CourseScale& scale,
+                          double top) {
   std::string text;
   for (std::size_t i = 0; i < slices.size();) {
-    const std::string& name = slices[i].bottleneck;
+    const std::string& name = slices[i].most_engaged;
     std::size_t end = i + 1;
-    while (end < slices.size() && slices[end].bottleneck == name) ++end;
+    while (end < slices.size() && slices[end].most_engaged == name) ++end;
     const double from = scale.x(run, slices[i].from);
     const double to = scale.x(run, slices[end - 1].to);
     text += fmt::format(
@@ -161,7 +161,7 @@ std::string time_axis(const CourseScale& scale, double y) {
 }
 
 std::string slices_csv(const std::vector<RunResult>& runs, const std::vector<std::vector<CourseSlice>>& slices) {
-  std::vector<std::string> columns{"run", "from", "to", "bottleneck", "unit"};
+  std::vector<std::string> columns{"run", "from", "to", "most_engaged", "unit"};
   for (unsigned state = 0; state < unit_states; ++state)
     columns.emplace_back(vrpipe::name_of(static_cast<UnitState>(state)));
   CsvText csv(columns);
@@ -169,7 +169,7 @@ std::string slices_csv(const std::vector<RunResult>& runs, const std::vector<std
     for (const CourseSlice& slice : slices[i]) {
       for (const UnitShares& unit : slice.units) {
         std::vector<std::string> cells{name_of(runs[i].request), fmt::format("{}", slice.from),
-                                       fmt::format("{}", slice.to), slice.bottleneck, unit.unit};
+                                       fmt::format("{}", slice.to), slice.most_engaged, unit.unit};
         for (const double share : unit.shares) cells.push_back(fmt::format("{:.6g}", share));
         csv.row(cells);
       }
@@ -212,8 +212,9 @@ std::string course_section(const JobResult& result) {
     body += fmt::format("<text x=\"4\" y=\"{:.1f}\" class=\"axis strong\">{}</text>\n", y + 14,
                         html_escaped(name_of(runs[i].request)));
     y += course_heading;
-    body += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">bottleneck</text>\n", course_left - 8, y + 13);
-    body += bottleneck_strip(runs[i], slices[i], scale, y);
+    body +=
+        fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">most engaged</text>\n", course_left - 8, y + 13);
+    body += engaged_strip(runs[i], slices[i], scale, y);
     y += strip_height + 4;
     for (std::size_t unit = 0; unit < slices[i].front().units.size(); ++unit) {
       body += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>\n", course_left - 8, y + 15,
@@ -231,8 +232,8 @@ std::string course_section(const JobResult& result) {
       fill_definitions(id) + body + time_axis(scale, y - panel_gap + 4) + "</svg>\n";
   return html(
       PageFigure{id,
-                 "States of units in the course of each run, all on one scale of time. The bottleneck of a moment "
-                 "is the unit that is the least starved or blocked then.",
+                 "States of units in the course of each run, all on one scale of time. The most engaged of a moment "
+                 "is the unit that is the least starved or blocked then; which one bounds a run is told by occupancy.",
                  drawing, slices_csv(runs, slices)});
 }
 

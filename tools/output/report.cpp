@@ -196,13 +196,14 @@ void add_cache(RunTable& table, const std::vector<RunResult>& runs) {
 /// What passed between the levels, by what it was for, on a platform whose L2 misses.
 void add_memory(RunTable& table, const std::vector<RunResult>& runs) {
   const auto megabytes = [](const RunResult& run, const std::string& memory, const std::string& traffic) {
-    std::uint64_t bytes = 0;
+    std::optional<double> moved;  // none where there is no such memory
     for (const StatisticReport& report : run.statistics) {
       for (const char* direction : {"read", "written"}) {
-        if (report.name == memory + "." + traffic + "_bytes_" + direction) bytes += report.value;
+        if (report.name == memory + "." + traffic + "_bytes_" + direction)
+          moved = moved.value_or(0) + static_cast<double>(report.value) / 1e6;
       }
     }
-    return static_cast<double>(bytes) / 1e6;
+    return moved;
   };
   const auto misses = [](const RunResult& run) {
     return statistic_quotient(run, "l2.cache.sector_hit_rate").has_value();
@@ -216,9 +217,12 @@ void add_memory(RunTable& table, const std::vector<RunResult>& runs) {
       const auto cell = [&megabytes, memory = memory, traffic = traffic](const RunResult& run) {
         return megabytes(run, memory, traffic);
       };
-      if (std::none_of(runs.begin(), runs.end(), [&](const RunResult& run) { return cell(run) > 0; })) continue;
-      table.row(fmt::format("{}, {}", shown, what),
-                [&](const RunResult& run) { return is_of_pipeline(run) ? fmt::format("{:.2f}", cell(run)) : "-"; });
+      if (std::none_of(runs.begin(), runs.end(), [&](const RunResult& run) { return cell(run).value_or(0) > 0; }))
+        continue;
+      table.row(fmt::format("{}, {}", shown, what), [&](const RunResult& run) {
+        const std::optional<double> moved = cell(run);
+        return is_of_pipeline(run) && moved ? fmt::format("{:.2f}", *moved) : "-";
+      });
     }
   }
 }
@@ -415,6 +419,20 @@ std::string rejected_text(const RejectedGaussians& rejected) {
                      grouped(rejected.total()), grouped(rejected.not_finite), grouped(rejected.zero_quaternion));
 }
 
+/// What is not alike where a run is not of the pipeline.
+std::string drawn_otherwise_text(const std::vector<RunResult>& runs) {
+  std::string text;
+  for (const RunResult& run : runs) {
+    if (is_of_pipeline(run) || !run.cycles) continue;
+    const bool is_accelerator = run.request.variant.drawn_by == DrawnBy::accelerator;
+    text += fmt::format(
+        "{}: its cycles{} have the sorting of splats among them, which is before a draw of the pipeline; "
+        "its target is RGBA32F\n",
+        name_of(run.request), is_accelerator ? ", of the platform's clock," : "");
+  }
+  return text;
+}
+
 std::string remarks(const JobResult& result) {
   const std::vector<RunResult>& runs = result.runs;
   std::string text;
@@ -422,7 +440,7 @@ std::string remarks(const JobResult& result) {
     text += nothing_visible(result.scene, result.viewpoint.has_value()) + "\n";
   }
   text += stopped_text(runs.front());
-  text += fidelities_text(runs);
+  text += fidelities_text(runs) + drawn_otherwise_text(runs);
   for (const RunResult& run : runs) text += bound_text(run);
   text += expected_error_text(runs) + validated_text(runs);
   if (const auto early = early_termination_ratio(runs)) {
