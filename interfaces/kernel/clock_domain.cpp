@@ -147,10 +147,10 @@ void ClockDomain::edge() {
       for (const Cycle until = std::min(end, look_at_); !finished_ && cycle < until;) {
         const bool ticked = tick_order_.empty() ? tick_due(cycle) : tick_due_in_order(cycle);
         if (ticked) ++edges_;
-        cycle = ticked ? cycle + 1 : *std::min_element(due_.begin(), due_.end());
+        cycle = ticked ? cycle + 1 : next_edge();
       }
     }
-    do next_ = *std::min_element(due_.begin(), due_.end());
+    do next_ = next_edge();
     while (next_ == never && step_locals());
     if (next_ <= now_) throw SimulationFault(name(), now_, "a unit was woken for an edge in the past");
     if (next_ != never && next_ >= stop_at_) stopped_ = finished_ = true;

@@ -79,4 +79,8 @@ RopMshrs::RopMshrs(ParameterSet& owner)
     : Integer(owner, "mshrs", 384, 1, 65536, "sectors", "Accel-Sim, SM87_ORIN: 384 MSHRs of a first-level cache",
               "fills in flight, and as many write-backs") {}
 
+RopSectorsPerCycle::RopSectorsPerCycle(ParameterSet& owner, const char* meaning)
+    : Integer(owner, "sectors_per_cycle", 16, 1, 64, "sectors",
+              "measured on a GH100 graphics GPC: 8 a cycle and ROP partition; the paper's GPC has two", meaning) {}
+
 }  // namespace vrpipe

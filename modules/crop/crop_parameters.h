@@ -40,14 +40,7 @@ struct CropParameters : ParameterSet {
                               "signal only pixels that newly pass the threshold (paper 5.2)"};
   CacheParameters cache{*this, {"cache_bytes", 16384, 1 << 24, "CROP cache", 0, source::measured}};
   RopMshrs mshrs{*this};
-  Integer sectors_per_cycle{*this,
-                            "sectors_per_cycle",
-                            16,
-                            1,
-                            64,
-                            "sectors",
-                            "measured on a GH100 graphics GPC: 8 a cycle and ROP partition; the paper's GPC has two",
-                            "filled or written back in a cycle in which nothing is blended"};
+  RopSectorsPerCycle sectors_per_cycle{*this, "filled or written back in a cycle in which nothing is blended"};
   Switch writes_unchanged{*this, "writes_unchanged", false, source::measured,
                           "write sectors back in which no value changed"};
   Integer port_flits_per_cycle{

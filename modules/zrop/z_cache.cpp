@@ -15,14 +15,7 @@ ZCache::ZCache(const ZropParameters& parameters, DepthFormat format)
       fast_clear(parameters.fast_clear),
       fetch_ahead_lines(parameters.fetch_ahead_lines) {
   const std::uint32_t quad = DepthStencilSurface::bytes_per_quad(format);
-  const std::uint32_t tile = positions_per_tile * quad;
   organization.check("z-cache", "zrop", "cache_bytes");
-  if (organization.line_bytes > tile) {
-    throw UserError("unusable z-cache", "zrop.line_bytes",
-                    fmt::format("a line of {} bytes is of several screen tiles, which may be other GPCs'",
-                                organization.line_bytes),
-                    fmt::format("use lines of at most {}", tile));
-  }
   if (organization.sector_bytes < quad) {
     throw UserError("unusable z-cache", "zrop.sector_bytes",
                     fmt::format("a quad of {} bytes does not fit into a sector of {}", quad, organization.sector_bytes),

@@ -11,8 +11,8 @@ namespace vrpipe {
 
 /// The z-cache, of a ZROP with a memory port. Where that is not connected it holds everything, and nothing is moved.
 struct ZCache {
-  /// Throws UserError for one that cannot be: CacheOrganization::check; a sector holds a quad of the target, a line is of one
-  /// screen tile.
+  /// Throws UserError for one that cannot be: CacheOrganization::check; a sector holds a quad of the target. A line is of one
+  /// screen tile: no longer one can be set.
   ZCache(const ZropParameters& parameters, DepthFormat format);
 
   const CacheOrganization organization;

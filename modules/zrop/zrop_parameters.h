@@ -42,14 +42,8 @@ struct ZropParameters : ParameterSet {
                         64,           1,
                         65536,        "signals",
                         source::open, "between z-cache look-up and update; hides the latency of fills"};
-  Integer sectors_per_cycle{*this,
-                            "sectors_per_cycle",
-                            16,
-                            1,
-                            64,
-                            "sectors",
-                            "measured on a GH100 graphics GPC: 8 a cycle and ROP partition; the paper's GPC has two",
-                            "filled or written back in a cycle in which nothing is tested or updated"};
+  RopSectorsPerCycle sectors_per_cycle{*this,
+                                       "filled or written back in a cycle in which nothing is tested or updated"};
   Real half_block_cycles{*this,
                          "half_block_cycles",
                          0,

@@ -251,6 +251,17 @@ bool is_named(const std::string& name, const Instance& instance) {
   return name == instance.slot || names_path(name, instance.path);
 }
 
+/// What settings and options may name: slots and paths.
+std::vector<std::string> names_of_instances(const Netlist& netlist, bool with_memories) {
+  std::vector<std::string> names;
+  for (const Instance& instance : netlist.instances()) {
+    if (!with_memories && Netlist::is_memory(instance)) continue;
+    names.push_back(instance.slot);
+    names.push_back(instance.path);
+  }
+  return names;
+}
+
 bool is_before_crossbar(const std::string& slot) { return slot == "draw" || slot == "sm" || slot == "vpo"; }
 }  // namespace
 
@@ -272,12 +283,7 @@ void Configuration::check_units_at_cycle() const {
                       "take one fidelity for all units");
     }
     if (!named.empty() && !Netlist::is_memory(*named.front())) continue;
-    std::vector<std::string> known;
-    for (const Instance& instance : netlist_.instances()) {
-      if (Netlist::is_memory(instance)) continue;
-      known.push_back(instance.slot);
-      known.push_back(instance.path);
-    }
+    const std::vector<std::string> known = names_of_instances(netlist_, false);
     if (!named.empty()) {
       throw UserError("cannot simulate " + name + " at a fidelity of its own", where, "a memory's is that of the run",
                       "take --fidelity cycle, or a unit: " + known.front());
@@ -330,11 +336,8 @@ void Configuration::apply(const Setting& setting) {
   if (setting.unit.compare(0, link_prefix.size(), link_prefix) == 0) return set_link(setting);
   const std::vector<const Instance*> named = instances_named(setting.unit);
   if (named.empty()) {
-    std::vector<std::string> known{"state", "platform"};
-    for (const Instance& instance : netlist_.instances()) {
-      known.push_back(instance.slot);
-      known.push_back(instance.path);
-    }
+    std::vector<std::string> known = names_of_instances(netlist_, true);
+    known.insert(known.begin(), {"state", "platform"});
     const bool elsewhere = Registry::instance().has_slot(setting.unit);
     throw UserError("unknown unit '" + setting.unit + "'", "--set " + setting.unit + "." + setting.parameter,
                     elsewhere ? "platform " + request_.platform->name + " has none" : "no such unit",

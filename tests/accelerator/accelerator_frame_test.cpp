@@ -10,6 +10,7 @@
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/pipeline/slots/accelerator.h>
 
+#include "support/refusals.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
@@ -38,12 +39,7 @@ std::uint64_t count_in(const std::vector<StatisticReport>& statistics, const std
 }
 
 std::string refusal(const RunRequest& request, const Frame& frame = *Frame::of(testing::draw_of(16, 16))) {
-  try {
-    simulate_accelerator(request, frame, {});
-  } catch (const UserError& error) {
-    return error.what();
-  }
-  return "";
+  return testing::refusal_of([&] { simulate_accelerator(request, frame, {}); });
 }
 
 TEST(AcceleratorFrame, HasTheSameCountsAndImageAtEveryFidelity) {

@@ -9,17 +9,13 @@
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/pipeline/render_context.h>
 
+#include "support/refusals.h"
+
 namespace vrpipe {
 namespace {
 
-std::string refusal_of(const std::string& list) {
-  try {
-    EffectChoice::parse(list);
-  } catch (const UserError& error) {
-    return error.what();
-  }
-  ADD_FAILURE() << "took '" << list << "'";
-  return {};
+std::string refusal_of_list(const std::string& list) {
+  return testing::refusal_of([&] { EffectChoice::parse(list); });
 }
 
 void expect_in(const std::string& part, const std::string& whole) {
@@ -69,17 +65,17 @@ TEST(EffectChoice, WhatIsLeftOutIsOutWhateverElseIsSaid) {
 }
 
 TEST(EffectChoice, AnUnknownNameIsRefusedWithTheNearest) {
-  expect_in("raster.hi_z", refusal_of("raster.hiz"));
-  expect_in("unknown effect 'raster.hiz'", refusal_of("auto,-raster.hiz"));
-  expect_in("zrop.z_cache", refusal_of("all,zrop.zcache"));
-  expect_in("'all'", refusal_of("raster.hi_z,all"));
-  expect_in("'-raster.hi_z'", refusal_of("--raster.hi_z"));
+  expect_in("raster.hi_z", refusal_of_list("raster.hiz"));
+  expect_in("unknown effect 'raster.hiz'", refusal_of_list("auto,-raster.hiz"));
+  expect_in("zrop.z_cache", refusal_of_list("all,zrop.zcache"));
+  expect_in("'all'", refusal_of_list("raster.hi_z,all"));
+  expect_in("'-raster.hi_z'", refusal_of_list("--raster.hi_z"));
 }
 
 TEST(EffectChoice, AnEmptyListOrAnEmptyNameIsRefused) {
-  expect_in("empty", refusal_of(""));
+  expect_in("empty", refusal_of_list(""));
   for (const char* list : {",", ",auto", "auto,,raster.hi_z"}) {
-    expect_in("empty", refusal_of(list));
+    expect_in("empty", refusal_of_list(list));
   }
 }
 

@@ -12,6 +12,7 @@
 #include <vrpipe/platforms/simulation.h>
 
 #include "support/foreign_memory.h"
+#include "support/refusals.h"
 
 namespace vrpipe {
 namespace {
@@ -670,14 +671,11 @@ TEST_F(MemoryPortTest, AnEarlyCompletionMemoryMayDeclareTimeOfItsOwn) {
   EXPECT_EQ(clock->activations(), clock->edges());
 }
 
-/// What is thrown once the clock does not come to rest; empty if it does.
+/// What is thrown once the clock does not come to rest.
 std::string fault_before_rest(ClockDomain& clock) {
-  try {
+  return testing::refusal_of<SimulationFault>([&] {
     while (!clock.run_to_rest(sc_core::sc_time(100, sc_core::SC_US))) {}
-  } catch (const SimulationFault& fault) {
-    return fault.what();
-  }
-  return "";
+  });
 }
 
 TEST_F(MemoryPortTest, AMemoryThatFallsSilentIsNamedWithTheOldestRequest) {

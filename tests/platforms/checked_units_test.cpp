@@ -14,6 +14,7 @@
 #include "qru/qru.h"
 #include "raster/raster.h"
 #include "sm/sm.h"
+#include "support/refusals.h"
 #include "support/simulate.h"
 #include "tc/tc.h"
 #include "tgc/tgc.h"
@@ -296,12 +297,7 @@ std::string fault_of(const Case& broken, Fidelity fidelity, const Frame& frame) 
     r.units = {{broken.slot, broken.name}};
   });
   fresh_simulation();
-  try {
-    simulate(request, frame);
-  } catch (const SimulationFault& fault) {
-    return fault.what();
-  }
-  return "none";
+  return testing::refusal_of<SimulationFault>([&] { simulate(request, frame); });
 }
 std::string fault_of(const Case& broken, Fidelity fidelity, const Draw& draw) {
   return fault_of(broken, fidelity, *Frame::of(draw, draw_state_of(request_of("het+qm"))));

@@ -11,6 +11,7 @@
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/netlist.h>
 
+#include "support/refusals.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
@@ -176,21 +177,17 @@ TEST(Deadlock, IsReportedWithTheUnitsThatWait) {
   }
 }
 
-std::string refusal_of(std::function<void(Netlist&)> wire, Fidelity fidelity) {
+std::string refusal_of_wiring(std::function<void(Netlist&)> wire, Fidelity fidelity) {
   Platform wrong = platform_named("agx-orin-ideal-memory");
   wrong.name = "wrong";
   wrong.wire = std::move(wire);
-  try {
-    run(request_of("baseline", fidelity, [&](RunRequest& r) { r.platform = &wrong; }), testing::draw_of(16, 16));
-  } catch (const UserError& error) {
-    return error.what();
-  }
-  return "no error";
+  const RunRequest request = request_of("baseline", fidelity, [&](RunRequest& r) { r.platform = &wrong; });
+  return testing::refusal_of([&] { run(request, testing::draw_of(16, 16)); });
 }
 
 TEST(Wiring, APortLeftOpenIsNamed) {
   for (const Fidelity fidelity : fidelities()) {
-    const std::string error = refusal_of([](Netlist& netlist) { netlist.add("draw"); }, fidelity);
+    const std::string error = refusal_of_wiring([](Netlist& netlist) { netlist.add("draw"); }, fidelity);
     EXPECT_NE(error.find("draw.out_vertices_0"), std::string::npos) << error;
   }
 }
@@ -198,7 +195,7 @@ TEST(Wiring, APortLeftOpenIsNamed) {
 TEST(Wiring, UnknownUnitsAndPortsGetTheNearestName) {
   for (const Fidelity fidelity : fidelities()) {
     const auto expect = [&](const std::string& text, std::function<void(Netlist&)> wire) {
-      const std::string error = refusal_of(std::move(wire), fidelity);
+      const std::string error = refusal_of_wiring(std::move(wire), fidelity);
       EXPECT_NE(error.find(text), std::string::npos) << error << " at " << name_of(fidelity);
     };
     expect("did you mean draw", [](Netlist& netlist) {

@@ -9,6 +9,7 @@
 
 #include "support/fidelities.h"
 #include "support/foreign_memory.h"
+#include "support/refusals.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
@@ -74,12 +75,7 @@ ForeignMemory as_memory(std::unique_ptr<Module> module) {
 }
 
 std::string fault_of(const RunRequest& request, const Draw& draw) {
-  try {
-    run(request, draw);
-  } catch (const SimulationFault& fault) {
-    return fault.what();
-  }
-  return "no fault";
+  return testing::refusal_of<SimulationFault>([&] { run(request, draw); });
 }
 
 TEST(ForeignMemory, TakesThePlaceOfTheL2ThoughItsRefreshNeverEnds) {

@@ -4,6 +4,7 @@
 #include <vrpipe/pipeline/slots/wdx.h>
 #include <vrpipe/platforms/wiring.h>
 
+#include "support/refusals.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
@@ -34,12 +35,7 @@ const std::vector<InstanceStatistic>& by_gpc(const RunResult& result, const std:
 }
 
 std::string refused_configuration(const RunRequest& request) {
-  try {
-    check_configuration(request);
-  } catch (const UserError& error) {
-    return error.what();
-  }
-  return "";
+  return testing::refusal_of([&] { check_configuration(request); });
 }
 
 TEST(Gpcs, AreAsManyAsIsSaid) {
@@ -56,9 +52,9 @@ TEST(Gpcs, AreAsManyAsIsSaid) {
 }
 
 TEST(Gpcs, OfOneTheCrossbarIsNotThereButItsSettingsAreChecked) {
-  EXPECT_EQ(refused_configuration(on_gpcs(1, "qm", Fidelity::lt, {{"wdx", "unit_tiles", "4"}})), "");
+  EXPECT_EQ(refused_configuration(on_gpcs(1, "qm", Fidelity::lt, {{"wdx", "unit_tiles", "4"}})), "none");
   EXPECT_EQ(refused_configuration(on_gpcs(1, "qm", Fidelity::lt, {{"wdx", "row_offset", "4"}}, {{"wdx", "tpc-table"}})),
-            "");
+            "none");
   EXPECT_NE(refused_configuration(on_gpcs(1, "qm", Fidelity::lt, {{"wdx", "unit_tile", "4"}})).find("wdx.unit_tiles"),
             std::string::npos);
   EXPECT_NE(refused_configuration(on_gpcs(1, "qm", Fidelity::lt, {{"wdx", "unit_tiles", "0"}})).find("1 to 64"),

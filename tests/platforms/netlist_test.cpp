@@ -16,6 +16,7 @@
 #include <vrpipe/platforms/wiring.h>
 
 #include "crop/crop_time.h"
+#include "support/refusals.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
@@ -28,16 +29,11 @@ using testing::run;
 using testing::same_image;
 using testing::strictly;
 
-std::string refusal_of(const Platform& platform, Fidelity fidelity, const std::vector<Setting>& settings = {}) {
+std::string refusal_of_run(const Platform& platform, Fidelity fidelity, const std::vector<Setting>& settings = {}) {
   RunRequest request = request_of("het+qm", fidelity, strictly);
   request.platform = &platform;
   request.settings = settings;
-  try {
-    run(request, random_draw(32, 32, 10, 1));
-  } catch (const UserError& error) {
-    return error.what();
-  }
-  return "no error";
+  return testing::refusal_of([&] { run(request, random_draw(32, 32, 10, 1)); });
 }
 
 /// 100 ns for any access; a refresh that never stops, if it is asked for.
@@ -178,7 +174,7 @@ TEST(Netlist, AFrontEndAloneRunsAtEveryFidelity) {
 TEST(Netlist, StrictTerminationWithoutAWayToCropIsRefused) {
   const Platform broken =
       edited("agx-orin-ideal-memory", [](Netlist& netlist) { netlist.disconnect("gpc0.prop.out_survivors"); });
-  EXPECT_NE(refusal_of(broken, Fidelity::cycle).find("no survivors leave PROP"), std::string::npos);
+  EXPECT_NE(refusal_of_run(broken, Fidelity::cycle).find("no survivors leave PROP"), std::string::npos);
 }
 
 TEST(Instances, ParametersNameAnInstanceOrAllOfAKind) {
@@ -218,13 +214,13 @@ TEST(Instances, ParametersNameAnInstanceOrAllOfAKind) {
 
 TEST(Instances, UnknownPathsAndLinksGetTheNearestName) {
   const Platform& desktop = platform_named("desktop");
-  const auto text = [&](const Setting& setting) { return refusal_of(desktop, Fidelity::functional, {setting}); };
+  const auto text = [&](const Setting& setting) { return refusal_of_run(desktop, Fidelity::functional, {setting}); };
   EXPECT_NE(text({"gpc9.crop", "cache_bytes", "4096"}).find("did you mean gpc"), std::string::npos);
   EXPECT_NE(text({"link.tc.bin", "depth", "4"}).find("link.tc.bins"), std::string::npos);
   EXPECT_NE(text({"link.tc.bins", "deepth", "4"}).find("did you mean link.tc.bins.depth"), std::string::npos);
   EXPECT_NE(text({"link.tc.bins", "depth", "0"}).find("1 to 65536"), std::string::npos);
   const Platform none = edited("agx-orin-ideal-memory", [](Netlist& netlist) { netlist.remove("gpc0.tgc"); });
-  EXPECT_NE(refusal_of(none, Fidelity::functional, {{"tgc", "bins", "4"}}).find("has none"), std::string::npos);
+  EXPECT_NE(refusal_of_run(none, Fidelity::functional, {{"tgc", "bins", "4"}}).find("has none"), std::string::npos);
 }
 
 // A unit's choice by path: one GPC merges quads, the other does not.
@@ -274,7 +270,8 @@ TEST(ForeignMemories, TakeThePlaceOfTheL2) {
       EXPECT_EQ(own.counts.named(), other.counts.named()) << base << " " << name_of(fidelity);
       EXPECT_TRUE(same_image(own.framebuffer.color, other.framebuffer.color)) << base << " " << name_of(fidelity);
     }
-    EXPECT_NE(refusal_of(platform, Fidelity::lt, {{"l2", "latency_cycles", "9"}}).find("has none"), std::string::npos);
+    EXPECT_NE(refusal_of_run(platform, Fidelity::lt, {{"l2", "latency_cycles", "9"}}).find("has none"),
+              std::string::npos);
   }
 }
 
@@ -352,7 +349,7 @@ TEST(ForeignMemories, WithoutEnoughSocketsAreRefused) {
   const Platform platform = edited("desktop", [](Netlist& netlist) {
     netlist.replace_memory("l2", [](const std::string& name, unsigned) { return make_other(name, 2); });
   });
-  EXPECT_NE(refusal_of(platform, Fidelity::lt).find("4 units are connected to 2 sockets"), std::string::npos);
+  EXPECT_NE(refusal_of_run(platform, Fidelity::lt).find("4 units are connected to 2 sockets"), std::string::npos);
 }
 
 }  // namespace

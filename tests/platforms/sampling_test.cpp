@@ -16,6 +16,7 @@
 
 #include "support/fidelities.h"
 #include "support/foreign_memory.h"
+#include "support/refusals.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
@@ -210,27 +211,23 @@ TEST(Sampling, WhatSawNothingHasNoValueYet) {
 }
 
 TEST(Sampling, OfWhatIsNotThereIsRefusedBeforeTheRun) {
-  const auto refusal_of = [](Fidelity fidelity, const std::string& name) -> std::string {
+  const auto refusal = [](Fidelity fidelity, const std::string& name) {
     RunRequest request = request_of("baseline", fidelity);
     request.observers = std::make_shared<Observers>();
     request.observers->on_statistics(100, {name}, [](Cycle, const auto&) {});
-    try {
-      check_configuration(request);
-    } catch (const UserError& error) {
-      EXPECT_THROW(run(request, random_draw(16, 16, 10, 9)), UserError);
-      return error.what();
-    }
-    return "accepted";
+    const std::string before = testing::refusal_of([&] { check_configuration(request); });
+    EXPECT_EQ(testing::refusal_of([&] { run(request, random_draw(16, 16, 10, 9)); }), before);
+    return before;
   };
   const auto expect_in = [](const std::string& part, const std::string& text) {
     EXPECT_NE(text.find(part), std::string::npos) << text;
   };
-  EXPECT_EQ(refusal_of(Fidelity::cycle, "crop.quads_blended"), "accepted");
-  expect_in("did you mean crop.quads_blended?", refusal_of(Fidelity::cycle, "crop.quads_blendet"));
-  expect_in("did you mean gpc0.crop.quads_blended?", refusal_of(Fidelity::lt, "gpc1.crop.quads_blended"));
-  expect_in("'dram.*'", refusal_of(Fidelity::lt, "dram.*"));
+  EXPECT_EQ(refusal(Fidelity::cycle, "crop.quads_blended"), "none");
+  expect_in("did you mean crop.quads_blended?", refusal(Fidelity::cycle, "crop.quads_blendet"));
+  expect_in("did you mean gpc0.crop.quads_blended?", refusal(Fidelity::lt, "gpc1.crop.quads_blended"));
+  expect_in("'dram.*'", refusal(Fidelity::lt, "dram.*"));
   for (const Fidelity fidelity : {Fidelity::functional, Fidelity::bound}) {
-    expect_in("use lt or cycle", refusal_of(fidelity, "crop.quads_blended"));
+    expect_in("use lt or cycle", refusal(fidelity, "crop.quads_blended"));
   }
   EXPECT_THROW(Observers().on_statistics(0, {"crop.quads_blended"}, [](Cycle, const auto&) {}), UserError);
 }

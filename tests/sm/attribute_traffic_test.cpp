@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "sm/sm_parameters.h"
 #include "vpo/vpo.h"
 
 #include "support/builders.h"
@@ -19,6 +20,9 @@ using testing::flat_box;
 
 /// Splats that all can be seen.
 std::vector<Splat> boxes(std::uint32_t count) { return std::vector<Splat>(count, flat_box(8, 8, 24, 24, 0.5F)); }
+
+/// By the default parameters.
+AttributeFetch usual_fetch() { return SmTime(SmParameters(), DevicePrecision()).fetch; }
 
 struct Requests {
   std::vector<MemoryRequest> all;
@@ -55,7 +59,7 @@ Requests writes_of(const AttributeTraffic& traffic, const VertexWarp& warp) {
 TEST(AttributeTraffic, AVertexWarpReadsItsSplatsLineByLine) {
   const Draw draw = draw_of(64, 64, boxes(24));
   const RenderContext context = testing::context_of(draw);
-  const AttributeTraffic traffic(context, AttributeFetch());
+  const AttributeTraffic traffic(context, usual_fetch());
   const AddressMap map = address_map(*context.frame, context.format);
   for (std::uint32_t first = 0; first < 24; first += 8) {
     const Requests reads = reads_of(traffic, {first, 8});
@@ -72,7 +76,7 @@ TEST(AttributeTraffic, AVertexWarpReadsItsSplatsLineByLine) {
 TEST(AttributeTraffic, AVertexWarpThatBeginsInASectorReadsAllOfIt) {
   const Draw draw = draw_of(64, 64, boxes(24));
   const RenderContext context = testing::context_of(draw);
-  const AttributeTraffic traffic(context, AttributeFetch());
+  const AttributeTraffic traffic(context, usual_fetch());
   const std::uint64_t vertices = address_map(*context.frame, context.format).vertices.address;
   // Bytes 240 to 479 of the splats.
   const Requests reads = reads_of(traffic, {5, 5});
@@ -89,7 +93,7 @@ TEST(AttributeTraffic, AGeometryIsReadWhereItIsHoweverOftenItIsDrawn) {
   frame.draw(second, {});
   frame.draw(first, {}, "", 8, 8);
   const RenderContext context = testing::context_of(frame);
-  const AttributeTraffic traffic(context, AttributeFetch());
+  const AttributeTraffic traffic(context, usual_fetch());
   const AddressMap map = address_map(frame, context.format);
   const auto vertices = [&](std::uint32_t splat, DrawIndex draw) {
     return reads_of(traffic, {splat, 8, draw}).begin - map.vertices.address;
@@ -104,7 +108,7 @@ TEST(AttributeTraffic, TrianglesOfTheirOwnAreReadAsWell) {
   Draw draw = draw_of(64, 64, boxes(16));
   draw.triangles.assign(16, testing::one_quad_triangle(10, 10));
   const RenderContext context = testing::context_of(draw);
-  const AttributeTraffic traffic(context, AttributeFetch());
+  const AttributeTraffic traffic(context, usual_fetch());
   const AddressMap map = address_map(*context.frame, context.format);
   const Requests reads = reads_of(traffic, {8, 8});
   EXPECT_EQ(reads.bytes, 8U * 48 + 8 * 24);
@@ -124,7 +128,7 @@ TEST(AttributeTraffic, AMeshIsReadByTrianglesOf120Bytes) {
   DrawState state;
   state.shader = FragmentShader::lit;
   const RenderContext context = testing::context_of(draw, state);
-  const AttributeTraffic traffic(context, AttributeFetch());
+  const AttributeTraffic traffic(context, usual_fetch());
   const AddressMap map = address_map(*context.frame, context.format);
   EXPECT_EQ(map.vertices.bytes, 24U * 120);
   const Requests reads = reads_of(traffic, {8, 8});
@@ -137,7 +141,7 @@ TEST(AttributeTraffic, AMeshIsReadByTrianglesOf120Bytes) {
 TEST(AttributeTraffic, AVertexWarpWrites704BytesASplat) {
   const Draw draw = draw_of(64, 64, boxes(16));
   const RenderContext context = testing::context_of(draw);
-  const AttributeTraffic traffic(context, AttributeFetch());
+  const AttributeTraffic traffic(context, usual_fetch());
   const std::uint64_t attributes = address_map(*context.frame, context.format).attributes.address;
   const Requests writes = writes_of(traffic, {8, 8});
   EXPECT_EQ(writes.all.size(), 44U) << "whole lines";
@@ -154,7 +158,7 @@ TEST(AttributeTraffic, AVertexWarpWrites704BytesASplat) {
 TEST(AttributeTraffic, AttributesGoRoundInTheirBuffer) {
   const Draw draw = draw_of(64, 64, boxes(32));
   const RenderContext context = testing::context_of(draw);
-  AttributeFetch fetch;
+  AttributeFetch fetch = usual_fetch();
   fetch.buffer_bytes = 16 * 704;
   const AttributeTraffic traffic(context, fetch);
   const std::uint64_t attributes = address_map(*context.frame, context.format).attributes.address;
@@ -192,7 +196,7 @@ TEST(AttributeTraffic, OfWhatIsCulledNothingIsWritten) {
   splats[6].cx = 1e9F;                                 // beyond the guard band
   const Draw draw = draw_of(64, 64, splats);
   const RenderContext context = testing::context_of(draw);
-  const AttributeTraffic traffic(context, AttributeFetch());
+  const AttributeTraffic traffic(context, usual_fetch());
   const std::uint64_t attributes = address_map(*context.frame, context.format).attributes.address;
   const Requests writes = writes_of(traffic, {0, 8});
   EXPECT_EQ(writes.bytes, 4U * 704);
@@ -208,7 +212,7 @@ TEST(AttributeTraffic, WritesTheHalfOfEachPrimitiveThatIsAssembledOnce) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const Draw draw = testing::random_draw(96, 64, 300, seed);
     const RenderContext context = testing::context_of(draw);
-    const AttributeTraffic traffic(context, AttributeFetch());
+    const AttributeTraffic traffic(context, usual_fetch());
     const std::uint64_t attributes = address_map(*context.frame, context.format).attributes.address;
     PrimitiveAssembly vpo(PrimitiveAssembly::Parameters(), context);
     std::set<std::uint64_t> expected;
@@ -248,7 +252,7 @@ Warp warp_of(const std::vector<std::pair<std::uint32_t, unsigned>>& primitives) 
 TEST(AttributeTraffic, AFragmentWarpReadsEachPrimitiveOnce) {
   const Draw draw = draw_of(64, 64, boxes(16));
   const RenderContext context = testing::context_of(draw);
-  const AttributeTraffic traffic(context, AttributeFetch());
+  const AttributeTraffic traffic(context, usual_fetch());
   const std::uint64_t attributes = address_map(*context.frame, context.format).attributes.address;
   AttributeTraffic::FragmentReads reads;
   traffic.find_reads(warp_of({{3, 0}, {3, 0}, {4, 0}, {3, 0}, {4, 0}, {4, 1}, {3, 0}, {4, 1}}), reads);
@@ -270,7 +274,7 @@ TEST(AttributeTraffic, ReadsTheSectorsOfAsManyBytesAsTheShaderWants) {
   const RenderContext context = testing::context_of(draw);
   const std::uint64_t attributes = address_map(*context.frame, context.format).attributes.address;
   for (std::uint32_t bytes = 4; bytes <= 352; bytes += 4) {
-    AttributeFetch fetch;
+    AttributeFetch fetch = usual_fetch();
     fetch.attribute_bytes = bytes;
     const AttributeTraffic traffic(context, fetch);
     AttributeTraffic::FragmentReads reads;
@@ -302,7 +306,7 @@ TEST(AttributeTraffic, AFragmentWarpThatReadsColourReadsItsQuadsAndNoAttributes)
   Frame frame(64, 64);
   frame.draw(testing::geometry_of(64, 64, boxes(2)), testing::alpha_threshold_state());
   const RenderContext context = testing::context_of(frame);
-  const AttributeTraffic traffic(context, AttributeFetch());
+  const AttributeTraffic traffic(context, usual_fetch());
   Warp warp;
   warp.tile = {1, 0};
   for (const unsigned position : {0U, 9U, 2U, 1U, 63U})

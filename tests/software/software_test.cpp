@@ -19,6 +19,7 @@
 
 #include "preparation/preparation.h"
 #include "software/software_statistic.h"
+#include "support/refusals.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
@@ -41,12 +42,7 @@ SoftwareResult render(const RunRequest& request, const Draw& draw, std::optional
 }
 
 std::string refused(const RunRequest& request, const Frame& frame) {
-  try {
-    simulate_software(request, frame, {});
-  } catch (const UserError& error) {
-    return error.what();
-  }
-  return "";
+  return testing::refusal_of([&] { simulate_software(request, frame, {}); });
 }
 std::string refused(const RunRequest& request) { return refused(request, *Frame::of(testing::draw_of(16, 16))); }
 
@@ -298,26 +294,19 @@ TEST(SoftwareVariant, AKernelThatSaysNothingOfFragmentsHasNone) {
 
 TEST(SoftwareVariant, RefusesWhatIsOfThePipelineAlone) {
   const Draw draw = testing::draw_of(16, 16);
-  const auto refusal_of = [&](const RunRequest& request) -> std::string {
-    try {
-      simulate(request, draw);
-    } catch (const UserError& error) {
-      return error.what();
-    }
-    return "";
-  };
+  const auto refusal = [&](const RunRequest& request) { return testing::refusal_of([&] { simulate(request, draw); }); };
   RunRequest stopped = variant_at("software", Fidelity::cycle);
   stopped.stop_at = 10;
-  EXPECT_NE(refusal_of(stopped).find("stop"), std::string::npos);
+  EXPECT_NE(refusal(stopped).find("stop"), std::string::npos);
   RunRequest stalled = variant_at("software", Fidelity::cycle);
   stalled.stall_seed = 1;
-  EXPECT_NE(refusal_of(stalled).find("ports"), std::string::npos);
+  EXPECT_NE(refusal(stalled).find("ports"), std::string::npos);
   RunRequest observed = variant_at("software", Fidelity::cycle);
   observed.observers = std::make_shared<Observers>();
   observed.observers->on_states([](const std::string&, UnitState, Cycle) {});
-  EXPECT_NE(refusal_of(observed).find("observed"), std::string::npos);
+  EXPECT_NE(refusal(observed).find("observed"), std::string::npos);
   EXPECT_THROW(check_configuration(observed), UserError);
-  EXPECT_NE(refusal_of(variant_at("accelerator", Fidelity::cycle)).find("take lt"), std::string::npos);
+  EXPECT_NE(refusal(variant_at("accelerator", Fidelity::cycle)).find("take lt"), std::string::npos);
   Frame tested(16, 16);
   DrawState state;
   state.depth.test = true;

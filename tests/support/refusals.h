@@ -6,12 +6,12 @@
 
 namespace vrpipe::testing {
 
-/// What a UserError says that an action ends with; "none" if it ends without.
-template <class Action>
+/// What an Error says that an action ends with; "none" if it ends without.
+template <class Error = UserError, class Action>
 std::string refusal_of(Action&& action) {
   try {
     action();
-  } catch (const UserError& error) {
+  } catch (const Error& error) {
     return error.what();
   }
   return "none";

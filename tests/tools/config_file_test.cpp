@@ -121,6 +121,14 @@ TEST_F(ConfigFile, DefinesVariantsThatStandBesideTheFourInItsOrder) {
   EXPECT_EQ(result["runs"][5]["result_hash"], result["runs"][1]["result_hash"]);
 }
 
+TEST_F(ConfigFile, DefinesVariantsThatNameUnitsOfGpcsOfTheirOwn) {
+  const json result = with(
+      "scene = \"tiny.spl\"\nvariant = \"two\"\n[set]\ntc.bins = 7\n"
+      "[variants.two]\nbase = \"qm\"\nset.platform.gpcs = 2\nunit.\"gpc1.qru\" = \"pass-through\"\n",
+      "run");
+  EXPECT_EQ(result["platform"]["parameters"]["platform.gpcs"], 2);
+}
+
 TEST_F(ConfigFile, MayBeOverruledInWhatItDefines) {
   const json result = with("scene = \"tiny.spl\"\n[variants.a]\nbase = \"qm\"\nset.tc.bins = 3\n", "compare",
                            {"--variant", "a=het,tc.bins=4"});
@@ -151,6 +159,15 @@ TEST_F(ConfigFile, PrintedReadsBackToTheSameRunAndTheSameFile) {
            {"run", "--scene", "tiny.spl", "--variant", "mine=het,tc.bins=7", "--set", "tc.bins=1"},
            {"compare", "--scene", "tiny.spl", "--variant", "mine=het,tc.bins=7", "--variant", "baseline", "--set",
             "tc.bins=1"},
+           {"run", "--scene", "tiny.spl", "--set", "gpc0.tc.bins=9", "--set", "tc.bins=5"},
+           // Units of variants have parameters of their own, and other defaults.
+           {"run", "--scene", "tiny.spl", "--variant", "in-shader", "--set", "crop.lock_clock_mhz=1980", "--set",
+            "gpc0.crop.warps=16", "--set", "crop.latency_cycles=9"},
+           {"compare", "--scene", "tiny.spl", "--platform", "mobile", "--platform", "desktop", "--variant",
+            "mine=in-shader,crop.hand_over_cycles=900", "--variant", "in-shader-no-lock", "--set",
+            "gpc0.crop.blend_cycles=70", "--set", "link.gpc0.tc.bins.depth=3"},
+           {"compare", "--scene", "tiny.spl", "--variant", "baseline", "--variant", "lpddr5=het+qm,dram=lpddr5-6400",
+            "--set", "dram.channels=4"},
            {"run", "--frame", "frame.json", "--fidelity", "lt"},
            {"compare", "--frame", "frame.json", "--set", "tc.bins=3"},
            {"microbench", "kill-rate", "--fidelity", "bound", "--set", "tc.bins=9"},
@@ -191,6 +208,22 @@ TEST_F(ConfigFile, PrintedHasEveryParameterAndItsOrigin) {
   const json result = json_of({"run", "--config", "config.toml", "--set", "tgc.bins=7"});
   for (const auto& [name, value] : result["platform"]["parameters"].items()) line(name);
   EXPECT_EQ(files(), (std::vector<std::string>{"config.toml", "tiny.spl"})) << "nothing is simulated";
+}
+
+TEST_F(ConfigFile, PrintedHasWhatRunsDifferInAsComments) {
+  const std::string text =
+      printed({"compare", "--scene", "tiny.spl", "--variant", "baseline", "--variant", "x=qm,dram=lpddr5-6400"});
+  const std::size_t of_baseline = text.find("\n# baseline has these, of its own\n");
+  const std::size_t of_x = text.find("\n# x has these, of its own\n");
+  ASSERT_LT(of_baseline, of_x);
+  ASSERT_LT(of_x, text.size());
+  EXPECT_LT(text.find("\ndram.channels = "), of_baseline);
+  EXPECT_EQ(text.find("\ndram.banks = "), std::string::npos);
+  const std::size_t eight = text.find("\n# dram.banks = 8 ");
+  EXPECT_LT(of_baseline, eight);
+  EXPECT_LT(eight, of_x);
+  EXPECT_LT(of_x, text.find("\n# dram.banks = 16 "));
+  EXPECT_EQ(text.find("crop.latency_cycles", of_baseline), std::string::npos);
 }
 
 TEST_F(ConfigFile, ThatSaysWhatIsSoAnywayChangesNothingInTheReport) {

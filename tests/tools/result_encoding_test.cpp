@@ -12,6 +12,8 @@
 #include <random>
 #include <stdexcept>
 
+#include "support/refusals.h"
+
 namespace vrpipe::tools {
 namespace {
 
@@ -211,21 +213,12 @@ void expect_equal(const RunResult& actual, const RunResult& expected) {
 
 RunResult through_bytes(const RunResult& result) { return from_bytes(to_bytes(result), result.request); }
 
-/// What is wrong with it; empty when it is read.
-std::string refusal(const std::function<RunResult()>& read) {
-  try {
-    read();
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return {};
+/// What is wrong with it; "none" when it is read.
+std::string refusal(const Json& json) {
+  return testing::refusal_of<std::runtime_error>([&] { decode(json, a_request()); });
 }
-
-std::string refusal_of(const Json& json) {
-  return refusal([&] { return decode(json, a_request()); });
-}
-std::string refusal_of(const std::string& bytes) {
-  return refusal([&] { return from_bytes(bytes, a_request()); });
+std::string refusal(const std::string& bytes) {
+  return testing::refusal_of<std::runtime_error>([&] { from_bytes(bytes, a_request()); });
 }
 
 /// Calls `visit` with every value of a document, which it may change for the time of the call.
@@ -324,8 +317,8 @@ TEST(ResultEncoding, TextsThatAreNotUtf8AreBytes) {
 }
 
 TEST(ResultEncoding, WhatIsMissingTooMuchOrOfAnotherTypeIsRefused) {
-  ASSERT_EQ(refusal_of(encode(full_result())), "");
-  EXPECT_EQ(refusal_of(Json::array()), "a simulation's result cannot be read: result is not what it should be");
+  ASSERT_EQ(refusal(encode(full_result())), "none");
+  EXPECT_EQ(refusal(Json::array()), "a simulation's result cannot be read: result is not what it should be");
   Json json = encode(full_result());
   for_each_value(json, [&](Json& value) {
     const Json good = value;
@@ -333,41 +326,41 @@ TEST(ResultEncoding, WhatIsMissingTooMuchOrOfAnotherTypeIsRefused) {
     for (const Json& bad : {good.is_boolean() ? Json(1U) : Json(true), Json(-1),
                             good.is_number_float() ? Json(1U) : Json(1.5), Json({{"x", 1U}})}) {
       value = bad;
-      EXPECT_NE(refusal_of(json), "") << bad << " in place of " << good;
+      EXPECT_NE(refusal(json), "none") << bad << " in place of " << good;
     }
     if (good.is_object()) {
       for (const auto& member : good.items()) {
         value = good;
         value.erase(member.key());
-        EXPECT_NE(refusal_of(json).find(member.key()), std::string::npos) << refusal_of(json);
+        EXPECT_NE(refusal(json).find(member.key()), std::string::npos) << refusal(json);
       }
       value = good;
       value["unheard_of"] = 1U;
-      EXPECT_NE(refusal_of(json), "");
+      EXPECT_NE(refusal(json), "none");
     }
     value = good;
   });
   json["units"][0]["cycles"].push_back(1U);
-  EXPECT_NE(refusal_of(json), "") << "a unit state too many";
+  EXPECT_NE(refusal(json), "none") << "a unit state too many";
   json = encode(full_result());
   json["effects"][0]["proof"] = "likely";
-  EXPECT_NE(refusal_of(json).find("proof"), std::string::npos) << refusal_of(json);
+  EXPECT_NE(refusal(json).find("proof"), std::string::npos) << refusal(json);
 }
 
 TEST(ResultEncoding, ADamagedResultIsRefused) {
   const std::string bytes = to_bytes(full_result());
   for (std::size_t size = 0; size < bytes.size(); ++size) {
-    EXPECT_NE(refusal_of(bytes.substr(0, size)), "") << "cut to " << size << " bytes";
+    EXPECT_NE(refusal(bytes.substr(0, size)), "none") << "cut to " << size << " bytes";
   }
-  EXPECT_NE(refusal_of(bytes + '\0'), "");
-  EXPECT_NE(refusal_of(std::string("a file of something else")), "");
+  EXPECT_NE(refusal(bytes + '\0'), "none");
+  EXPECT_NE(refusal(std::string("a file of something else")), "none");
   // As deep as the stack would not bear.
-  EXPECT_NE(refusal_of(std::string(1000000, '\x81')), "");
-  EXPECT_NE(refusal_of(std::string(1000, '\x9b') + std::string(8, '\xff')), "");
+  EXPECT_NE(refusal(std::string(1000000, '\x81')), "none");
+  EXPECT_NE(refusal(std::string(1000, '\x9b') + std::string(8, '\xff')), "none");
   // Sizes that are not there.
   for (const char* head : {"\x9b", "\xbb", "\x5b", "\x7b"}) {
-    EXPECT_NE(refusal_of(head + std::string(8, '\xff')), "");
-    EXPECT_NE(refusal_of(head + std::string("\x7f") + std::string(7, '\xff')), "");
+    EXPECT_NE(refusal(head + std::string(8, '\xff')), "none");
+    EXPECT_NE(refusal(head + std::string("\x7f") + std::string(7, '\xff')), "none");
   }
   // Whatever else happens to a byte: a result, or a refusal.
   std::mt19937 random(1);
@@ -376,7 +369,7 @@ TEST(ResultEncoding, ADamagedResultIsRefused) {
     for (auto changes = 1 + random() % 3; changes > 0; --changes) {
       damaged[random() % damaged.size()] = static_cast<char>(random());
     }
-    refusal_of(damaged);
+    refusal(damaged);
   }
 }
 

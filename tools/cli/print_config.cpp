@@ -5,12 +5,13 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
+#include <map>
+#include <set>
 
 #include <fmt/format.h>
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/platforms/netlist.h>
-#include <vrpipe/platforms/software.h>
 
 #include "jobs/settings.h"
 
@@ -85,6 +86,13 @@ std::string default_of(const Option& option) {
   return "default: " + text;
 }
 
+/// Of a parameter of one unit or link: what it is called in all GPCs.
+std::string kind_of(const std::string& parameter) {
+  const std::string link = "link.";
+  const std::size_t begin = parameter.compare(0, link.size(), link) == 0 ? link.size() : 0, end = parameter.rfind('.');
+  return parameter.substr(0, begin) + without_gpc(parameter.substr(begin, end - begin)) + parameter.substr(end);
+}
+
 class ConfigWriter {
  public:
   ConfigWriter(const Invocation& invocation, const std::vector<RunRequest>& requests)
@@ -127,39 +135,43 @@ class ConfigWriter {
     return text;
   }
 
-  std::string parameters(const std::vector<std::pair<std::string, std::string>>& preprocess) const {
-    const bool one_platform = std::all_of(requests_.begin(), requests_.end(), [&](const RunRequest& request) {
-      return request.platform == requests_.front().platform;
-    });
+  using Parameters = std::vector<std::pair<std::string, std::string>>;
+  std::string parameters(const Parameters& preprocess) const {
     std::string text = "\n[set]\n";
     for (const auto& [name, value] : preprocess) text += parameter_line(name, value, nullptr);
-    // Their own values are those of units that variants may have put others in the place of.
-    for (const Setting& setting : requests_.front().settings) {
-      if (!is_outside_pipeline(setting.unit)) continue;
-      text += parameter_line(setting.unit + "." + setting.parameter, setting.value, nullptr);
-    }
-    if (one_platform) {
-      RunRequest common = requests_.front();
-      common.variant = variant_named("het+qm");
-      for (const auto& [name, value] : final_parameters(common)) {
-        text += parameter_line(name, value, common.platform);
-      }
-      return text;
-    }
-    for (const Setting& setting : requests_.front().settings) {
-      if (is_outside_pipeline(setting.unit)) continue;
-      const std::string name = setting.unit + "." + setting.parameter;
-      text += line_of(key_text(name), value_text(setting.value), given("--set", name));
-    }
-    const Platform* last = nullptr;
+    // What variants set stands in their tables.
+    std::vector<RunRequest> runs;
+    std::vector<Parameters> all;
+    std::vector<std::map<std::string, Parameters>> of_kind;  // the units', with those of instances that differ
     for (const RunRequest& request : requests_) {
-      if (std::exchange(last, request.platform) == request.platform) continue;
-      text += "\n# " + request.platform->name + " has these, of its own\n";
-      RunRequest of_platform = request;
-      of_platform.variant = variant_named("het+qm");
-      for (const auto& [name, value] : final_parameters(of_platform)) {
-        text += "# " + parameter_line(name, value, request.platform);
+      runs.push_back(without_changes(request));
+      all.push_back(final_parameters(runs.back()));
+      of_kind.emplace_back();
+      for (const auto& parameter : all.back()) of_kind.back()[kind_of(parameter.first)].push_back(parameter);
+    }
+    // Platforms, and units that variants bring, differ in what they have and in their defaults.
+    const auto is_common = [&](const std::string& name) {
+      const std::string kind = kind_of(name);
+      return std::all_of(of_kind.begin(), of_kind.end(), [&](const auto& of_run) {
+        const auto found = of_run.find(kind);
+        return found != of_run.end() && found->second == of_kind.front().at(kind);
+      });
+    };
+    for (const auto& [name, value] : all.front()) {
+      if (is_common(name)) text += parameter_line(name, value, &runs.front());
+    }
+    for (const Setting& setting : requests_.front().settings) {
+      const std::string name = setting.unit + "." + setting.parameter;
+      if (!is_common(name)) text += parameter_line(name, setting.value, nullptr);
+    }
+    std::set<std::string> seen;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      std::string own;
+      for (const auto& [name, value] : all[i]) {
+        if (!is_common(name)) own += "# " + parameter_line(name, value, &runs[i]);
       }
+      if (own.empty() || !seen.insert(own).second) continue;
+      text += "\n# " + name_of(runs[i]) + " has these, of its own\n" + own;
     }
     return text;
   }
@@ -195,7 +207,7 @@ class ConfigWriter {
     return found != nullptr && found->is_given();
   }
 
-  std::string parameter_line(const std::string& name, const std::string& value, const Platform* platform) const {
+  std::string parameter_line(const std::string& name, const std::string& value, const RunRequest* run) const {
     std::string origin = "default";
     const auto has = [&](const std::vector<Setting>& settings) {
       return std::any_of(settings.begin(), settings.end(), [&](const Setting& setting) {
@@ -203,11 +215,12 @@ class ConfigWriter {
         return set == name || set == without_gpc(name);
       });
     };
-    if (platform != nullptr && has(platform->settings)) origin = "platform";
+    if (run != nullptr && has(run->platform->settings)) origin = "platform";
     for (const std::string& text : invocation_.arguments->find("--set")->texts) {
       const std::string key = text.substr(0, text.find('='));
       if (key == name || key == without_gpc(name)) origin = given("--set", key);
     }
+    if (run != nullptr && has(run->variant.changed_settings)) origin = "variant";
     return line_of(key_text(name), value_text(value), origin);
   }
 

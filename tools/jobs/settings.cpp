@@ -58,14 +58,20 @@ bool declares(const RunRequest& request, const std::string& parameter) {
   });
 }
 
+RunRequest without_changes(RunRequest request) {
+  std::vector<Setting>& changed = request.variant.changed_settings;
+  const auto is_of_unit = [](const Setting& setting) { return setting.unit != "platform"; };
+  changed.erase(std::remove_if(changed.begin(), changed.end(), is_of_unit), changed.end());
+  return request;
+}
+
 void leave_out_restated(std::vector<RunRequest>& requests, const std::function<bool(const Setting&)>& which) {
   const std::vector<Setting>& given = requests.front().settings;
   std::vector<bool> restated, is_listed(given.size(), false);
   for (const Setting& setting : given) restated.push_back(which(setting));
   for (const RunRequest& request : requests) {
     // What a variant sets itself hides a setting, and does not make it so anyway.
-    RunRequest whole = request;
-    whole.variant.changed_settings.clear();
+    const RunRequest whole = without_changes(request);
     RunRequest shorter = whole;
     std::vector<Setting>& kept = shorter.settings;
     kept.erase(std::remove_if(kept.begin(), kept.end(), which), kept.end());

@@ -29,6 +29,9 @@ std::vector<std::pair<std::string, std::string>> final_parameters(const RunReque
 /// unit's is, if it can be set at all. Throws UserError.
 bool declares(const RunRequest& request, const std::string& parameter);
 
+/// Without what its variant sets itself beside the number of GPCs, whose units it may name.
+RunRequest without_changes(RunRequest request);
+
 /// Leaves out those settings of `which` that are so anyway in every request, so that reports list changes alone: a
 /// configuration file may say everything. Throws UserError.
 void leave_out_restated(std::vector<RunRequest>& requests, const std::function<bool(const Setting&)>& which);

@@ -158,6 +158,8 @@ class ClockDomain : public sc_core::sc_module {
  protected:
   /// Of a local clock.
   ClockDomain(const sc_core::sc_module_name& name, ClockDomain& global);
+  /// The next edge that a unit wants; `never` for none.
+  Cycle next_edge() const { return *std::min_element(due_.begin(), due_.end()); }
 
  private:
   friend class LocalClock;

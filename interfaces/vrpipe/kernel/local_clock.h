@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <memory>
 
 #include <vrpipe/kernel/clock_domain.h>
@@ -17,8 +16,7 @@ class LocalClock : public ClockDomain {
 
   /// Between edges: lets those before a cycle come.
   void advance(Cycle until);
-  /// The next edge that a unit wants; `never` for none.
-  Cycle next_edge() const { return *std::min_element(due_.begin(), due_.end()); }
+  using ClockDomain::next_edge;
   /// Does what does not wait for an edge, as behind each; it may advance the clock. False if there is nothing.
   virtual bool rouse() { return false; }
 

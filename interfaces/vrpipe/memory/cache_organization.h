@@ -81,4 +81,9 @@ struct RopMshrs : Integer {
   explicit RopMshrs(ParameterSet& owner);
 };
 
+/// Parameter `sectors_per_cycle` of a ROP's cache; its meaning says what the ROP does in other cycles.
+struct RopSectorsPerCycle : Integer {
+  RopSectorsPerCycle(ParameterSet& owner, const char* meaning);
+};
+
 }  // namespace vrpipe

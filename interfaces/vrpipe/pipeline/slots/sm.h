@@ -25,15 +25,15 @@ inline std::uint64_t instructions_in(const std::vector<ShaderSegment>& program) 
   return sum;
 }
 
-/// How an SM array fetches vertices and attributes where its memory port is connected.
+/// How an SM array fetches vertices and attributes where its memory port is connected, by its parameters.
 struct AttributeFetch {
-  std::uint32_t attribute_bytes = 40;    ///< of a primitive, that the fragment shader reads
-  std::uint32_t buffer_bytes = 1 << 20;  ///< of memory, in which attributes go round
-  std::uint32_t attribute_writes = 640;  ///< of the array in flight: what comes behind waits
-  std::uint32_t core_bytes = 32;         ///< a cycle, of a core's share of the array's memory port
-  std::uint32_t l1_latency_cycles = 38;  ///< until what a core's L1 holds is there
-  std::uint32_t l1_mshrs = 384;          ///< sectors that a core may have asked for
-  CacheOrganization l1{49152};           ///< lines of 128 bytes, sectors of 32; of 0 bytes: none
+  std::uint32_t attribute_bytes = 0;    ///< of a primitive, that the fragment shader reads
+  std::uint32_t buffer_bytes = 0;       ///< of memory, in which attributes go round
+  std::uint32_t attribute_writes = 0;   ///< of the array in flight: what comes behind waits
+  std::uint32_t core_bytes = 0;         ///< a cycle, of a core's share of the array's memory port
+  std::uint32_t l1_latency_cycles = 0;  ///< until what a core's L1 holds is there
+  std::uint32_t l1_mshrs = 0;           ///< sectors that a core may have asked for
+  CacheOrganization l1;                 ///< lines of 128 bytes, sectors of 32; of 0 bytes: none
   bool has_l1() const { return l1.bytes != 0; }
 };
 
