@@ -144,7 +144,7 @@ void SimulationArguments::declare_variant(Arguments& arguments) {
       .add_option("--variant", variant_, "NAME|NAME=BASE,...",
                   "baseline, qm (quad merging), het (hardware early termination), het+qm,\n"
                   "software or accelerator (docs/software.md), or one of your own, as in\n"
-                  "mine=het+qm,qru=same-splat,tc.bins=64 (default: " +
+                  "mine=het+qm,tgc=pass-through,tc.bins=64\n(default: " +
                       variant_default + "; docs/configuration.md)",
                   machine_group)
       .default_text = variant_default;
@@ -201,8 +201,9 @@ void SimulationArguments::declare(Arguments& arguments, Variants variants) {
 void SimulationArguments::declare_variants(Arguments& arguments) {
   arguments.add_option("--variant", variant_, "NAME|NAME=BASE,...",
                        "what is compared: baseline, qm, het, het+qm, software, accelerator, or one of\n"
-                       "your own, as in mine=het+qm,qru=same-splat,tc.bins=64; can be repeated (default:\n"
-                       "the first four, and those of plugins and of --config; docs/configuration.md)",
+                       "your own, as in mine=het+qm,tgc=pass-through,tc.bins=64; can be repeated\n"
+                       "(default: the first four, and those of plugins and of --config;\n"
+                       "docs/configuration.md)",
                        machine_group);
 }
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr const char* variant_option = "--variant";
 constexpr const char* form = "NAME=BASE[,SLOT=IMPLEMENTATION][,UNIT.PARAMETER=VALUE]...";
-constexpr const char* example = "give e.g. --variant mine=het+qm,qru=same-splat,tc.bins=64";
+constexpr const char* example = "give e.g. --variant mine=het+qm,tgc=pass-through,tc.bins=64";
 
 /// Splits at the first `=`; both sides must be there.
 std::pair<std::string, std::string> pair_of(const std::string& part, const std::string& text) {

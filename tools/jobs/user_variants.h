@@ -26,7 +26,7 @@ std::string text_of(const VariantDefinition& definition);
 /// base, and a change of what all runs share; that units and parameters exist is checked with the platform.
 const Variant& add_user_variant(const VariantDefinition& definition);
 
-/// What it changes, as in "qru=same-splat, tc.bins=64".
+/// What it changes, as in "tgc=pass-through, tc.bins=64".
 std::string changes_text(const Variant& variant);
 
 }  // namespace vrpipe::tools
