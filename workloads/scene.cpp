@@ -221,7 +221,8 @@ GaussianFile open_gaussians(const std::string& scene) {
   std::error_code ignored;
   if (!path.has_extension() && !std::filesystem::exists(path, ignored)) {
     throw UserError("cannot read scene", scene, "no such file",
-                    "check the path, or give " + kBuiltinPrefix + nearest_name(scene, builtin_scene_names()));
+                    "check the path; of built-in scenes " +
+                        suggestion(scene, builtin_scene_names(), "", kBuiltinPrefix));
   }
   refuse_mesh(path.string());
   return read_gaussian_file(scene);

@@ -30,8 +30,7 @@ class ConfigReader : public TomlFile {
   [[noreturn]] void refuse_key(const toml::node& node, const std::string& key,
                                const std::vector<std::string>& known) const {
     refuse(node, "unknown key '" + key + "'", "there is no such key here",
-           fmt::format("did you mean {}? `vrpipe {} --help` lists the options", nearest_name(key, known),
-                       arguments_.command()));
+           suggestion(key, known, fmt::format("`vrpipe {} --help` lists the options", arguments_.command())));
   }
 
   const toml::table& table(const toml::node& node, const std::string& key) const {

@@ -27,7 +27,7 @@ namespace {
   throw UserError("cannot log '" + unit + "'", EventLog::option,
                   is_memory ? "a memory has no states and no links" : "the platform has no such unit",
                   is_memory ? "log the units that ask it, such as crop"
-                            : "did you mean " + nearest_name(unit, names) + "?");
+                            : suggestion(unit, names, "`vrpipe units` lists all"));
 }
 
 }  // namespace

@@ -67,8 +67,7 @@ const Variant& add_user_variant(const VariantDefinition& definition) {
     std::vector<std::string> names;
     for (const Variant& each : known) names.push_back(each.name);
     throw UserError("unknown variant '" + definition.base + "'", where, "it is to be the base, and there is none",
-                    fmt::format("did you mean {}? There are {}", nearest_name(definition.base, names),
-                                fmt::join(names, ", ")));
+                    suggestion(definition.base, names));
   }
   Variant variant = variant_named(definition.base);
   variant.name = definition.name;
@@ -94,7 +93,7 @@ const Variant& add_user_variant(const VariantDefinition& definition) {
     if (dot == std::string::npos || dot == 0 || dot + 1 == key.size()) {
       const std::vector<std::string> slots = Registry::instance().slot_names();
       throw UserError("unknown slot '" + key + "'", where, "it is no slot, and no UNIT.PARAMETER",
-                      "did you mean " + nearest_name(key, slots) + "? `vrpipe units` lists all");
+                      suggestion(key, slots, "`vrpipe units` lists all"));
     }
     if (key.compare(0, dot, "preprocess") == 0) {
       throw UserError("cannot change '" + key + "'", where, "the scene is preprocessed once, for all variants",
