@@ -38,6 +38,7 @@ class BadInput : public ToolTest {
                                   "ELF...vrpipe-plugin/0.0.0/itanium-abi") +
                           '\0' + "...");
     write("file", "neither Gaussians nor a mesh");
+    write("junk.glb", "neither Gaussians nor a mesh");
     std::filesystem::create_directory(folder() / "folder.ply");
   }
 
@@ -108,6 +109,9 @@ TEST_F(BadInput, Scenes) {
   refused_with_outputs({"compare", "--scene", "cut.ply"}, {"cut.ply"});
   refused_with_outputs({"run", "--scene", "cut.spl"}, {"cut.spl", "60 splats"});
   refused_with_outputs({"run", "--scene", "other.ply"}, {"other.ply", "opacity"});
+  refused_with_outputs({"run", "--scene", "missing.glb"}, {"missing.glb", "no such file"});
+  for (const char* option : {"--scene", "--mesh"})
+    refused_with_outputs({"run", option, "junk.glb"}, {"junk.glb", "it is no glTF"});
   refused_with_outputs({"run", "--scene", "folder.ply"}, {"folder.ply", "directory"});
   refused_with_outputs({"run", "--scene", "file"}, {"file", "known format", ".ply"});
   refused_with_outputs({"run", "--scene", "builtin:objekt"}, {"builtin:objekt", "object"});

@@ -121,6 +121,15 @@ TEST_F(ConfigFile, DefinesVariantsThatStandBesideTheFourInItsOrder) {
   EXPECT_EQ(result["runs"][5]["result_hash"], result["runs"][1]["result_hash"]);
 }
 
+TEST_F(ConfigFile, DefinesVariantsInAnyOrder) {
+  const json result = with(
+      "scene = \"tiny.spl\"\nvariant = [\"a\", \"b\"]\n[variants.a]\nbase = \"b\"\nset.tgc.bins = 4\n"
+      "[variants.b]\nbase = \"c\"\nset.tc.bins = 3\n",
+      "compare", {"--variant", "a", "--variant", "b", "--variant", "c=qm"});
+  EXPECT_EQ(result["runs"][0]["changes"]["base"], "b");
+  EXPECT_EQ(result["runs"][0]["changes"]["set"], json({{"tc.bins", "3"}, {"tgc.bins", "4"}}));
+}
+
 TEST_F(ConfigFile, MayBeOverruledInWhatItDefines) {
   const json result = with("scene = \"tiny.spl\"\n[variants.a]\nbase = \"qm\"\nset.tc.bins = 3\n", "compare",
                            {"--variant", "a=het,tc.bins=4"});
@@ -206,12 +215,16 @@ TEST_F(ConfigFile, ThatCannotBeUsedIsRefusedWithItsLine) {
   bad("scene = \"tiny.spl\"\n\nsize = \"32\"\n", {"config.toml:3", "--size", "WIDTHxHEIGHT"});
   bad("[set]\n\ntc.bin = 4\n", {"'bin'", "config.toml:3", "tc.bins"});
   bad("[set]\ntc.bins = 0\n", {"config.toml:2", "tc.bins"});
+  bad("[set]\n\ntc = 3\n", {"'tc'", "config.toml:3", "no UNIT.PARAMETER"});
+  bad("[set]\ntc.bins = true\n", {"bad value 'true' (config.toml:2, tc.bins)"});
   bad("[set]\nnowhere.bins = 1\n", {"config.toml:2", "nowhere"});
   bad("[unit]\nqru = \"nothing\"\n", {"config.toml:2", "nothing"});
   bad("[variants.a]\nbase = \"hat\"\n", {"config.toml:", "'hat'", "did you mean het"});
   bad("[variants.a]\nbsae = \"het\"\n", {"config.toml:2", "'bsae'", "did you mean base"});
   bad("[variants.a]\nset.tc.bins = 1\n", {"config.toml:", "has no base"});
   bad("[variants.a]\nbase = \"het\"\nset.tc.bin = 1\n", {"config.toml:3", "'bin'"});
+  bad("[variants.a]\nbase = \"b\"\n[variants.b]\nbase = \"a\"\n", {"config.toml:", "based on itself: a on b on a"});
+  bad("[variants.a]\nbase = \"a\"\n", {"config.toml:1", "based on itself: a on a"});
   bad("variants = 3\n", {"config.toml:1", "table"});
   bad("explain-effects = 3\n", {"config.toml:1", "true or false"});
   bad("fidelity = 2020-01-01\n", {"config.toml:1", "fidelity"});
@@ -225,7 +238,7 @@ TEST_F(ConfigFile, ThatCannotBeUsedIsRefusedWithItsLine) {
   bad("[" + deep + "]\n", {"config.toml:1", "more than 64 parts"});
   bad("set = { " + deep + " = 1 }\n", {"config.toml:1", "more than 64 parts"});
   refused({"run", "--config", "nowhere.toml"}, {"nowhere.toml", "no such file"});
-  refused({"run", "--config", "."}, {"cannot read configuration"});
+  refused({"run", "--config", "."}, {"cannot read configuration (--config .): it is a directory"});
   refused({"units", "--config", "config.toml"}, {"--config"});
 }
 

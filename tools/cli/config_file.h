@@ -43,10 +43,11 @@ class ConfigFile {
   struct Mention {
     std::string text;
     unsigned line = 0;
+    std::string as_written;  ///< what stands in place of its beginning, to the parenthesis; empty: nothing
   };
   void add(const std::string& option, const std::string& key, const std::string& text, unsigned line);
   /// Of UNIT.PARAMETER or SLOT, wherever it stands.
-  void mention(const std::string& key, const std::string& value, unsigned line);
+  void mention(const std::string& key, const std::string& value, const std::string& as_written, unsigned line);
   void read(Arguments& arguments, const std::vector<std::string>& others);
   void apply(Arguments& arguments);
 

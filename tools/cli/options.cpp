@@ -541,7 +541,13 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
                                            const std::vector<std::string>& of_study) const {
   // Plugins first: they may bring the platform and the units that the other options name.
   load_plugins(plugins_);
-  for (const std::string& text : definitions_) add_user_variant(parse_variant(text));
+  std::vector<VariantDefinition> definitions;
+  for (const Values& texts : {definitions_, variant_}) {
+    for (const std::string& text : texts) {
+      if (text.find('=') != std::string::npos) definitions.push_back(parse_variant(text));
+    }
+  }
+  add_user_variants(std::move(definitions));
 
   SimulationJob job;
   job.schema = !views_.empty() ? "vrpipe.views/1" : variants == Variants::one ? "vrpipe.run/1" : "vrpipe.compare/1";
@@ -658,7 +664,7 @@ std::vector<Variant> SimulationArguments::chosen_variants(Variants variants) con
   std::vector<Variant> chosen;
   for (const std::string& text : variant_) {
     const bool is_new = text.find('=') != std::string::npos;
-    chosen.push_back(is_new ? add_user_variant(parse_variant(text)) : variant_named(text));
+    chosen.push_back(variant_named(is_new ? parse_variant(text).name : text));
   }
   if (chosen.empty() && variants == Variants::one) return {variant_named(variant_default)};
   return chosen.empty() ? vrpipe::variants() : chosen;

@@ -108,6 +108,35 @@ const Variant& add_user_variant(const VariantDefinition& definition) {
   return variant_named(definition.name);
 }
 
+void add_user_variants(std::vector<VariantDefinition> definitions) {
+  const auto based_on = [&](const VariantDefinition& definition) {
+    for (const std::vector<Variant>* const list : {&variants(), &more_variants()}) {
+      for (const Variant& known : *list) {
+        if (known.name == definition.base) return definitions.end();
+      }
+    }
+    return std::find_if(definitions.begin(), definitions.end(),
+                        [&](const VariantDefinition& other) { return other.name == definition.base; });
+  };
+  while (!definitions.empty()) {
+    auto next = definitions.begin();
+    std::vector<std::string> chain{next->name};
+    for (auto base = based_on(*next); base != definitions.end(); base = based_on(*next)) {
+      const bool is_circle = std::find(chain.begin(), chain.end(), base->name) != chain.end();
+      chain.push_back(base->name);
+      if (is_circle) {
+        throw UserError("cannot define variant '" + next->name + "'", std::string(variant_option) + " " + next->name,
+                        fmt::format("it is based on itself: {}", fmt::join(chain, " on ")),
+                        "base one of them on what there is, e.g. het+qm");
+      }
+      next = base;
+    }
+    const VariantDefinition definition = *next;
+    definitions.erase(next);
+    add_user_variant(definition);
+  }
+}
+
 std::string changes_text(const Variant& variant) {
   std::string text;
   const auto add = [&](const std::string& change) { text += (text.empty() ? "" : ", ") + change; };

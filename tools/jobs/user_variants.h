@@ -26,6 +26,9 @@ std::string text_of(const VariantDefinition& definition);
 /// base, and a change of what all runs share; that units and parameters exist is checked with the platform.
 const Variant& add_user_variant(const VariantDefinition& definition);
 
+/// Adds them all, each after the one that it is based on. Throws UserError, also for one that is based on itself.
+void add_user_variants(std::vector<VariantDefinition> definitions);
+
 /// What it changes, as in "tgc=pass-through, tc.bins=64".
 std::string changes_text(const Variant& variant);
 
