@@ -1,6 +1,7 @@
 // Configuration files: what they say, what the command line says instead, and what --print-config writes.
 #include "tool_test_support.h"
 
+#include <array>
 #include <regex>
 #include <sstream>
 
@@ -110,6 +111,34 @@ TEST_F(ConfigFile, GivesWayToTheCommandLineKeyByKey) {
   EXPECT_EQ(result["platform"]["parameters"]["tc.bin_quads"], 16);
   EXPECT_EQ(result["platform"]["origins"]["tc.bins"], "command line");
   EXPECT_EQ(result["platform"]["origins"]["tc.bin_quads"], "file");
+}
+
+TEST_F(ConfigFile, IsCheckedWhereTheCommandLineSaysOtherwise) {
+  for (const auto& [line, option, value] :
+       std::vector<std::array<const char*, 3>>{{"fidelity = \"bogus\"", "--fidelity", "lt"},
+                                               {"platform = \"bogus\"", "--platform", "mobile"},
+                                               {"size = 3", "--size", "32x32"},
+                                               {"fovy = nan", "--fovy", "40"},
+                                               {"eye = [0, 1]", "--eye", "0,0,-4"},
+                                               {"variant = \"hat\"", "--variant", "het"},
+                                               {"format = \"rgb\"", "--format", "rgba8"},
+                                               {"termination = \"late\"", "--termination", "strict"},
+                                               {"effects = \"alll\"", "--effects", "auto"},
+                                               {"background = \"2,0,0\"", "--background", "0,0,0"},
+                                               {"multi-pass = 0", "--multi-pass", "2"},
+                                               {"views = \"some\"", "--views", "2"},
+                                               {"jobs = 0", "--jobs", "1"},
+                                               {"interval = 0", "--interval", "100"},
+                                               {"set.tc.bins = 0", "--set", "tc.bins=3"},
+                                               {"set.tc.binz = 1", "--set", "tc.binz=3"},
+                                               {"unit.qru = \"bogus\"", "--unit", "qru=pairing"}}) {
+    SCOPED_TRACE(line);
+    write("config.toml", "\n" + std::string(line) + "\n");
+    refused({"compare", "--config", "config.toml", option, value}, {"config.toml:2, "});
+  }
+  // A mistake of the command line is not the file's.
+  write("config.toml", "size = \"32x32\"\n");
+  EXPECT_EQ(vrpipe({"run", "--config", "config.toml", "--size", "3"}).err.find("config.toml"), std::string::npos);
 }
 
 TEST_F(ConfigFile, DefinesVariantsThatStandBesideTheFourInItsOrder) {

@@ -7,6 +7,7 @@
 
 #include <vrpipe/component/error.h>
 
+#include "host/command_failure.h"
 #include "jobs/toml_file.h"
 #include "jobs/user_variants.h"
 
@@ -117,15 +118,15 @@ void ConfigFile::read(Arguments& arguments, const std::vector<std::string>& othe
     if (std::find(special.begin(), special.end(), option.name) == special.end()) known.push_back(option.name.substr(2));
   }
   known.insert(known.end(), others.begin(), others.end());
-  const auto mention_node = [&](const std::string& key, const toml::node& node) {
+  const auto mention_node = [&](const std::string& entry, const std::string& key, const toml::node& node) {
     const std::string value = reader.scalar(node, key);
     const auto flag = node.value_exact<bool>();
-    mention(key, value, flag ? (*flag ? "true" : "false") : value, node.source().begin.line);
+    mention(entry, key, value, flag ? (*flag ? "true" : "false") : value, node.source().begin.line);
   };
   for (const auto& [key, node] : ConfigReader::in_order(reader.root())) {
     if (std::find(others.begin(), others.end(), key) != others.end()) {
       reader.for_each_value(*node, [&](const std::string& name, const toml::node& value) {
-        for (const std::string& called : {name, "axis " + name, "--" + name}) mention_node(called, value);
+        for (const std::string& called : {name, "axis " + name, "--" + name}) mention_node("", called, value);
       });
       continue;
     }
@@ -140,7 +141,7 @@ void ConfigFile::read(Arguments& arguments, const std::vector<std::string>& othe
                         "write e.g. tc.bins = 64; `vrpipe units` lists all");
         }
         add("--" + key, path, path + "=" + reader.scalar(*leaf, path), leaf->source().begin.line);
-        mention_node(path, *leaf);
+        mention_node("--" + key + " " + path, path, *leaf);
       }
     } else if (key == variants_key) {
       for (const auto& [name, each] : ConfigReader::in_order(reader.table(*node, key))) {
@@ -148,7 +149,7 @@ void ConfigFile::read(Arguments& arguments, const std::vector<std::string>& othe
         add("--define", name, text_of(definition), ConfigReader::position(*each).line);
         for (const auto& [path, leaf] : TomlFile::leaves(*each->as_table())) {
           const std::size_t dot = path.find('.');
-          if (dot != std::string::npos) mention_node(path.substr(dot + 1), *leaf);
+          if (dot != std::string::npos) mention_node("--define " + name, path.substr(dot + 1), *leaf);
         }
       }
     } else if (option->kind == Option::Kind::flag) {
@@ -203,6 +204,14 @@ void ConfigFile::apply(Arguments& arguments) {
     texts.insert(texts.end(), typed.begin(), typed.end());
     option->give(texts);
   }
+  // What the file does not give is complained of as the command line's.
+  mentions_.erase(std::remove_if(mentions_.begin(), mentions_.end(),
+                                 [&](const Mention& each) {
+                                   return std::any_of(entries_.begin(), entries_.end(), [&](const Entry& entry) {
+                                     return !entry.used && entry.what() == each.entry;
+                                   });
+                                 }),
+                  mentions_.end());
 }
 
 bool ConfigFile::gives(const std::string& what) const {
@@ -220,20 +229,36 @@ std::vector<std::string> ConfigFile::settings() const {
 
 void ConfigFile::add(const std::string& option, const std::string& key, const std::string& text, unsigned line) {
   entries_.push_back({option, key, text, line});
+  const std::string entry = entries_.back().what();
   // A definition is complained of as the --variant that it is.
-  const std::string what = option == "--define" ? "--variant " + key : entries_.back().what();
-  for (const char* end : {")", "=", " ", ","}) mentions_.push_back({"(" + what + end, line, {}});
+  const std::string what = option == "--define" ? "--variant " + key : entry;
+  for (const char* end : {")", "=", " ", ","}) mentions_.push_back({entry, "(" + what + end, line, {}});
 }
 
-void ConfigFile::mention(const std::string& key, const std::string& value, const std::string& as_written,
-                         unsigned line) {
-  for (const char* end : {")", ","}) mentions_.push_back({"(" + key + end, line, {}});
-  mentions_.push_back({fmt::format("'{}' (slot {})", value, key), line, {}});
-  mentions_.push_back({fmt::format("'{}' ({}", value, key), line, fmt::format("'{}' (", as_written)});
+void ConfigFile::mention(const std::string& entry, const std::string& key, const std::string& value,
+                         const std::string& as_written, unsigned line) {
+  for (const char* end : {")", ","}) mentions_.push_back({entry, "(" + key + end, line, {}});
+  mentions_.push_back({entry, fmt::format("'{}' (slot {})", value, key), line, {}});
+  mentions_.push_back({entry, fmt::format("'{}' ({}", value, key), line, fmt::format("'{}' (", as_written)});
   const std::size_t dot = key.rfind('.');
   if (dot != std::string::npos)
-    mentions_.push_back({fmt::format("'{}' (unit {}", key.substr(dot + 1), key.substr(0, dot)), line, {}});
+    mentions_.push_back({entry, fmt::format("'{}' (unit {}", key.substr(dot + 1), key.substr(0, dot)), line, {}});
 }
+
+void ConfigFile::check_overridden(const Arguments& arguments) const {
+  for (const Entry& entry : entries_) {
+    const Option& option = *arguments.find(entry.option);
+    if (entry.used || !option.check) continue;
+    try {
+      option.check(entry.text);
+    } catch (const UserError& error) {
+      std::string message = error.what();
+      throw CommandFailure(exit_user_error, message.insert(message.find(" (") + 2, place(entry.line) + ", "));
+    }
+  }
+}
+
+std::string ConfigFile::place(unsigned line) const { return fmt::format("{}:{}", path_.string(), line); }
 
 std::string ConfigFile::located(std::string message) const {
   // The longest says the most.
@@ -249,7 +274,7 @@ std::string ConfigFile::located(std::string message) const {
     message.replace(start, place - start, best->as_written);
     place = start + best->as_written.size();
   }
-  return message.insert(place, fmt::format("{}:{}, ", path_.string(), best->line));
+  return message.insert(place, place(best->line) + ", ");
 }
 
 void note_config(const Invocation& invocation, Provenance& provenance) {
