@@ -106,6 +106,20 @@ void refuse_unused(const RunRequest& request, const std::vector<Variant>& varian
     check("--unit " + choice.slot + "=" + choice.implementation, choice.slot);
 }
 
+/// A unit for all that no variant takes.
+void refuse_overridden(const std::vector<UnitChoice>& units, const std::vector<Variant>& variants) {
+  for (const UnitChoice& choice : units) {
+    const UnitChoice* own = nullptr;
+    const auto has_own = [&](const Variant& variant) { return (own = own_unit(variant, choice)) != nullptr; };
+    if (!std::all_of(variants.begin(), variants.end(), has_own)) continue;
+    throw UserError("cannot choose a unit for '" + choice.slot + "'",
+                    "--unit " + choice.slot + "=" + choice.implementation,
+                    fmt::format("variant {} has a unit of its own in slot {}, {}", variants.back().name, own->slot,
+                                own->implementation),
+                    "leave it out, or take another variant");
+  }
+}
+
 /// Whether a setting is from a configuration file.
 std::function<bool(const Setting&)> of_file(const Invocation& invocation) {
   return [&invocation](const Setting& setting) {
@@ -647,7 +661,9 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
   job.preprocess_parameters = std::move(parts.preprocess_parameters);
 
   job.requests = requests(request, variants);
-  check_outside(job, variants_drawn_by(job, of_study));
+  const std::vector<Variant> drawn = variants_drawn_by(job, of_study);
+  check_outside(job, drawn);
+  refuse_overridden(job.requests.front().units, drawn);
   leave_out_restated(job.requests, of_file(invocation));
   for (RunRequest& each : job.requests) {
     const StdoutToStderr redirected;

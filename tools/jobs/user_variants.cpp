@@ -137,6 +137,14 @@ void add_user_variants(std::vector<VariantDefinition> definitions) {
   }
 }
 
+const UnitChoice* own_unit(const Variant& variant, const UnitChoice& choice) {
+  for (const UnitChoice& own : variant.changed_units) {
+    const bool is_there = own.slot == choice.slot || own.slot == without_gpc(choice.slot);
+    if (is_there && own.implementation != choice.implementation) return &own;
+  }
+  return nullptr;
+}
+
 std::string changes_text(const Variant& variant) {
   std::string text;
   const auto add = [&](const std::string& change) { text += (text.empty() ? "" : ", ") + change; };
