@@ -72,6 +72,7 @@ TEST_F(CommandLine, TheVariantThatHelpGivesAsAnExampleCanBeDrawn) {
     const std::string help = vrpipe({command, "--help"}).out;
     const std::size_t start = help.find("mine=het+qm,");
     ASSERT_NE(start, std::string::npos);
+    expect_in(help, {"het+qm", "in-shader", "in-shader-no-lock", "software", "accelerator"});
     const std::string example = help.substr(start, help.find_first_of(" ;\n", start) - start);
     const Finished finished = vrpipe({"run", "--scene", "tiny.spl", "--fidelity", "functional", "--variant", example});
     EXPECT_EQ(finished.code, 0) << finished.err;

@@ -11,6 +11,7 @@
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/software.h>
 #include <vrpipe/workloads/gaussian_file.h>
+#include <vrpipe/workloads/multi_pass.h>
 #include <vrpipe/workloads/scene_substitution.h>
 
 #include "cli/parse.h"
@@ -27,8 +28,6 @@ namespace {
 constexpr const char* energies_option = "--energies";
 constexpr const char* html_option = "--html";
 
-/// Each but the last is two draws.
-constexpr unsigned most_passes = most_draws / 2 + 1;
 constexpr unsigned usual_passes = 4;  // of the path that has several
 
 const std::string variant_default = "het+qm";
@@ -212,7 +211,8 @@ void SimulationArguments::declare_variant(Arguments& arguments) {
   arguments
       .add_option("--variant", variant_, "NAME|NAME=BASE,...",
                   "baseline, qm (quad merging), het (hardware early termination), het+qm,\n"
-                  "software or accelerator (docs/software.md), or one of your own, as in\n"
+                  "in-shader or in-shader-no-lock (shaders blend), software or accelerator\n"
+                  "(docs/software.md), or one of your own, as in\n"
                   "mine=het+qm,tgc=pass-through,tc.bins=64\n(default: " +
                       variant_default + "; docs/configuration.md)",
                   machine_group)
@@ -273,8 +273,9 @@ void SimulationArguments::declare(Arguments& arguments, Variants variants) {
 
 void SimulationArguments::declare_variants(Arguments& arguments) {
   arguments.add_option("--variant", variant_, "NAME|NAME=BASE,...",
-                       "what is compared: baseline, qm, het, het+qm, software, accelerator, or one of\n"
-                       "your own, as in mine=het+qm,tgc=pass-through,tc.bins=64; can be repeated\n"
+                       "what is compared: baseline, qm, het, het+qm, in-shader, in-shader-no-lock,\n"
+                       "software, accelerator, or one of your own, as in\n"
+                       " mine=het+qm,tgc=pass-through,tc.bins=64; can be repeated\n"
                        "(default: the first four, and those of plugins and of --config;\n"
                        "docs/configuration.md)",
                        machine_group);
