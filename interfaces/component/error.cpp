@@ -60,12 +60,14 @@ std::string near_name(const std::string& name, const std::vector<std::string>& k
 std::string suggestion(const std::string& name, const std::vector<std::string>& known, const std::string& lists,
                        const std::string& prefix) {
   constexpr std::size_t most_letters = 240;  // of a list that a line has room for
+  std::vector<std::string> named;            // once each
   std::string all;
-  std::size_t listed = 0;
-  for (; listed < known.size() && all.size() < most_letters; ++listed) {
-    all += (listed == 0 ? "" : ", ") + prefix + known[listed];
+  for (const std::string& each : known) {
+    if (std::find(named.begin(), named.end(), each) != named.end()) continue;
+    if (all.size() < most_letters) all += (named.empty() ? "" : ", ") + prefix + each;
+    named.push_back(each);
   }
-  const bool is_short = listed == known.size();
+  const bool is_short = all.size() < most_letters;
   const std::string near = near_name(name, known);
   std::string text = near.empty() ? "" : "did you mean " + prefix + near + "?";
   const auto add = [&](const std::string& more) { text += (text.empty() ? "" : near.empty() ? "; " : " ") + more; };
@@ -74,7 +76,7 @@ std::string suggestion(const std::string& name, const std::vector<std::string>& 
   } else if (is_short && (near.empty() || lists.empty())) {
     add((near.empty() ? "there are " : "There are ") + all);
   } else if (lists.empty()) {
-    add(std::string(near.empty() ? "there are " : "There are ") + std::to_string(known.size()) + ", such as " + prefix +
+    add(std::string(near.empty() ? "there are " : "There are ") + std::to_string(named.size()) + ", such as " + prefix +
         known.front());
   }
   if (!lists.empty()) add(lists);

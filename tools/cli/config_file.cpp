@@ -268,13 +268,9 @@ std::string ConfigFile::located(std::string message) const {
     if (best == nullptr || each.text.size() > best->text.size()) best = &each;
   }
   if (best == nullptr) return message;
-  std::size_t place = message.find(best->text) + best->text.find('(') + 1;
-  if (!best->as_written.empty()) {
-    const std::size_t start = message.find(best->text);
-    message.replace(start, place - start, best->as_written);
-    place = start + best->as_written.size();
-  }
-  return message.insert(place, place(best->line) + ", ");
+  const std::size_t start = message.find(best->text), size = best->text.find('(') + 1;
+  const std::string before = best->as_written.empty() ? best->text.substr(0, size) : best->as_written;
+  return message.replace(start, size, before + place(best->line) + ", ");
 }
 
 void note_config(const Invocation& invocation, Provenance& provenance) {

@@ -275,7 +275,7 @@ void SimulationArguments::declare_variants(Arguments& arguments) {
   arguments.add_option("--variant", variant_, "NAME|NAME=BASE,...",
                        "what is compared: baseline, qm, het, het+qm, in-shader, in-shader-no-lock,\n"
                        "software, accelerator, or one of your own, as in\n"
-                       " mine=het+qm,tgc=pass-through,tc.bins=64; can be repeated\n"
+                       "mine=het+qm,tgc=pass-through,tc.bins=64; can be repeated\n"
                        "(default: the first four, and those of plugins and of --config;\n"
                        "docs/configuration.md)",
                        machine_group);
