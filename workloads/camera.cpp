@@ -62,7 +62,8 @@ std::string other_cameras(const std::vector<Camera>& cameras, const std::string&
   for (const Camera& camera : cameras) {
     if (!camera.name.empty()) names.push_back(camera.name);
   }
-  if (!names.empty()) remedy += fmt::format(", or a name, such as {}", nearest_name(meant, names));
+  const std::string near = near_name(meant, names);
+  if (!names.empty()) remedy += fmt::format(", or a name, such as {}", near.empty() ? names.front() : near);
   return remedy;
 }
 

@@ -65,7 +65,8 @@ void draw_in_passes(Frame& frame, std::shared_ptr<const Draw> splats, const Draw
   if (first > there) refuse(fmt::format("splats from {} on of {}", first, there), "draw what is there");
   const std::uint64_t all = std::min<std::uint64_t>(count, there - first);
   if (passes == 0 || passes > all) {
-    refuse(fmt::format("{} splats do not make {} batches", all, passes), "use 1 to as many as there are splats");
+    refuse(fmt::format("{} splats do not make {} batches", all, passes),
+           fmt::format("use 1 to as many as there are splats, {} at most", most_passes));
   }
   if (state.stencil.test) refuse("the draw has a stencil test of its own", "leave that out");
   const DrawState batch = batch_state(state);

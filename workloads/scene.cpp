@@ -165,7 +165,8 @@ Viewpoint viewpoint(const SceneRequest& request, ImageSize default_size, const M
 
 /// A mesh in the place of Gaussians, which it lacks in more than one way.
 void refuse_mesh(const std::string& path) {
-  if (!is_mesh_file(path)) return;
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored) || !is_mesh_file(path)) return;
   throw UserError("cannot read scene", path, "it is a triangle mesh, no Gaussians", "draw it with a scene, as a mesh");
 }
 
@@ -221,7 +222,8 @@ GaussianFile open_gaussians(const std::string& scene) {
   std::error_code ignored;
   if (!path.has_extension() && !std::filesystem::exists(path, ignored)) {
     throw UserError("cannot read scene", scene, "no such file",
-                    "check the path, or give " + kBuiltinPrefix + nearest_name(scene, builtin_scene_names()));
+                    "check the path; of built-in scenes " +
+                        suggestion(scene, builtin_scene_names(), "", kBuiltinPrefix));
   }
   refuse_mesh(path.string());
   return read_gaussian_file(scene);

@@ -24,8 +24,7 @@ std::optional<SceneSubstitution> scene_substitution(const std::string& scene) {
   if (!is_known) {
     throw UserError("unknown built-in scene", scene,
                     "there is none that is named " + name + ", to put a file in its place",
-                    "did you mean " + nearest_name(name, known) + "=" + scene.substr(equals + 1) +
-                        "? A file whose name has a = is given as ./" + scene);
+                    suggestion(name, known, "a file whose name has a = is given as ./" + scene));
   }
   std::string file = scene.substr(equals + 1);
   if (file.empty() || begins(file, kPrefix)) {

@@ -59,7 +59,7 @@ void ParameterSet::set(const std::string& unit, const std::string& name, const s
                     "see `vrpipe units`");
   }
   throw UserError("unknown parameter '" + name + "'", "unit " + unit, "the unit does not declare it",
-                  "did you mean " + unit + "." + nearest_name(name, names) + "? `vrpipe units` lists all");
+                  suggestion(name, names, "`vrpipe units` lists all", unit + "."));
 }
 
 Integer::Integer(ParameterSet& owner, const char* name, std::uint32_t value, std::uint32_t minimum,

@@ -18,7 +18,7 @@ Port& port_named(const std::vector<Port*>& ports, const std::string& unit, const
     names.push_back(port->name());
   }
   throw UserError("unknown port '" + name + "'", "unit " + unit, "the unit has no such port",
-                  names.empty() ? "it has none in this direction" : "did you mean " + nearest_name(name, names) + "?");
+                  names.empty() ? "it has none in this direction" : suggestion(name, names));
 }
 
 std::map<std::string, UnitMaker>& clocked_makers() {

@@ -43,6 +43,16 @@ const std::vector<std::pair<EffectChoice::Base, const char*>>& bases() {
   return all;
 }
 
+/// @param names  what else may stand where the name does
+const Effect& effect_or_word(const std::string& full_name, std::vector<std::string> names) {
+  for (const Effect& effect : effect_list()) {
+    if (effect.full_name() == full_name) return effect;
+    names.push_back(effect.full_name());
+  }
+  throw UserError("unknown effect '" + full_name + "'", "--effects", "nothing declares it",
+                  suggestion(full_name, names, "`vrpipe units --effects` lists all"));
+}
+
 }  // namespace
 
 const std::vector<Effect>& effects() { return effect_list(); }
@@ -68,15 +78,7 @@ void add_effect(Effect effect) {
   Registry::instance().count_registration();
 }
 
-const Effect& effect_named(const std::string& full_name) {
-  std::vector<std::string> names;
-  for (const Effect& effect : effects()) {
-    if (effect.full_name() == full_name) return effect;
-    names.push_back(effect.full_name());
-  }
-  throw UserError("unknown effect '" + full_name + "'", "--effects", "nothing declares it",
-                  "did you mean " + nearest_name(full_name, names) + "? `vrpipe units` lists all");
-}
+const Effect& effect_named(const std::string& full_name) { return effect_or_word(full_name, {}); }
 
 EffectChoice EffectChoice::parse(const std::string& text) {
   const auto refuse = [&](const std::string& why, const std::string& remedy) {
@@ -98,7 +100,11 @@ EffectChoice EffectChoice::parse(const std::string& text) {
     const bool leaves_out = !word.empty() && word.front() == '-';
     if (leaves_out) word.erase(0, 1);
     if (word.empty()) refuse("a name is empty", "give names separated by single commas");
-    const Effect& effect = effect_named(word);
+    std::vector<std::string> first_words;
+    for (const auto& known : bases()) {
+      if (is_first && !leaves_out) first_words.emplace_back(known.second);
+    }
+    const Effect& effect = effect_or_word(word, first_words);
     const std::string name = effect.full_name();
     if (leaves_out && effect.decide == nullptr) refuse(name + " is always active", "leave -" + name + " away");
     if (leaves_out && is_first) {

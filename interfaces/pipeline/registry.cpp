@@ -42,7 +42,7 @@ const Slot& Registry::slot(const std::string& name) const {
     if (slot.name == name) return slot;
   }
   throw UserError("unknown slot '" + name + "'", "--unit", "no such slot",
-                  "did you mean " + nearest_name(name, slot_names()) + "? `vrpipe units` lists all");
+                  suggestion(name, slot_names(), "`vrpipe units` lists all"));
 }
 
 std::vector<std::string> Registry::slot_names() const {
@@ -59,7 +59,7 @@ void Registry::add(Implementation implementation) {
   if (!is_good_name(implementation.name)) return add_bad_name("unit", implementation.name);
   if (!has_slot(implementation.slot)) {
     return add_problem({"there is no slot '" + implementation.slot + "' for its unit '" + implementation.name + "'",
-                        "did you mean " + nearest_name(implementation.slot, slot_names()) + "?"});
+                        suggestion(implementation.slot, slot_names())});
   }
   for (const auto& known : implementations_) {
     if (known->slot == implementation.slot && known->name == implementation.name) {
@@ -81,7 +81,7 @@ const Implementation& Registry::find(const std::string& slot, const std::string&
     names.push_back(implementation->name);
   }
   throw UserError("unknown unit '" + name + "'", "slot " + slot, "nothing of that name is registered",
-                  "did you mean " + nearest_name(name, names) + "? `vrpipe units` lists all");
+                  suggestion(name, names, "`vrpipe units` lists all"));
 }
 
 std::vector<const Implementation*> Registry::of_slot(const std::string& slot) const {

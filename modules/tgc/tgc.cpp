@@ -167,7 +167,8 @@ const EffectRegistrar eviction_effect{
        const std::uint32_t side = tgc.grid_tiles * screen_tile_pixels;
        const Frame& frame = *asked.context.frame;
        const std::uint32_t grids = ((frame.width() + side - 1) / side) * ((frame.height() + side - 1) / side);
-       const std::string numbers = fmt::format("{} tile grids, {} bins", grids, std::uint32_t{tgc.bins});
+       const std::string numbers = fmt::format("{} tile grid{}, {} bin{}", grids, grids == 1 ? "" : "s",
+                                               std::uint32_t{tgc.bins}, tgc.bins == 1 ? "" : "s");
        return grids <= tgc.bins ? EffectDecision::omit(numbers) : EffectDecision::watch(numbers);
      }}};
 }  // namespace

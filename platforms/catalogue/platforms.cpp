@@ -59,7 +59,7 @@ const Platform& platform_named(const std::string& name) {
                     "give agx-orin; what that was is agx-orin-ideal-memory");
   }
   throw UserError("unknown platform '" + name + "'", "--platform", "there is no such platform",
-                  "did you mean " + nearest_name(name, names) + "? `vrpipe platforms` lists all");
+                  suggestion(name, names, "`vrpipe platforms` lists all"));
 }
 
 }  // namespace vrpipe

@@ -289,7 +289,7 @@ void Configuration::check_units_at_cycle() const {
                       "take --fidelity cycle, or a unit: " + known.front());
     }
     throw UserError("unknown unit '" + name + "'", where, "platform " + request_.platform->name + " has none",
-                    "did you mean " + nearest_name(name, known) + "? `vrpipe units` lists all");
+                    suggestion(name, known, "`vrpipe units` lists all"));
   }
 }
 
@@ -341,7 +341,7 @@ void Configuration::apply(const Setting& setting) {
     const bool elsewhere = Registry::instance().has_slot(setting.unit);
     throw UserError("unknown unit '" + setting.unit + "'", "--set " + setting.unit + "." + setting.parameter,
                     elsewhere ? "platform " + request_.platform->name + " has none" : "no such unit",
-                    "did you mean " + nearest_name(setting.unit, known) + "? `vrpipe units` lists all");
+                    suggestion(setting.unit, known, "`vrpipe units` lists all"));
   }
   for (const Instance* instance : named) {
     UnitChoices& unit = units_[instance->path];
@@ -372,9 +372,8 @@ void Configuration::set_link(const Setting& setting) {
   }
   if (found) return;
   throw UserError("unknown link '" + name + "'", "--set " + setting.unit + "." + setting.parameter, "no such link",
-                  known.empty()
-                      ? "the platform has none"
-                      : "did you mean " + link_prefix + nearest_name(name, known) + "? `vrpipe units` lists all");
+                  known.empty() ? "the platform has none"
+                                : suggestion(name, known, "`vrpipe units` lists all", link_prefix));
 }
 
 std::unique_ptr<Behaviour> Configuration::make(const Instance& instance) const {

@@ -214,7 +214,7 @@ Instance& Netlist::instance(const std::string& path) {
     paths.push_back(instance.path);
   }
   refuse("unknown unit '" + path + "'", "platform", "it was not added",
-         paths.empty() ? "add it first" : "did you mean " + nearest_name(path, paths) + "?");
+         paths.empty() ? "add it first" : suggestion(path, paths));
 }
 
 std::vector<std::string> Netlist::used_memories() const {
@@ -258,7 +258,7 @@ void Netlist::check_memory(const std::string& path) const {
     paths.push_back(instance.path);
   }
   refuse("unknown memory '" + path + "'", "platform", "it was not added",
-         paths.empty() ? "add it first" : "did you mean " + nearest_name(path, paths) + "?");
+         paths.empty() ? "add it first" : suggestion(path, paths));
 }
 
 void Netlist::check_is_new(const std::string& path) const {
@@ -273,7 +273,7 @@ std::vector<Link>::iterator Netlist::link_at(const std::string& port) {
     ports.push_back(link->from);
   }
   refuse("unknown link '" + port + "'", "platform", "no link begins there",
-         ports.empty() ? "connect it first" : "did you mean " + nearest_name(port, ports) + "?");
+         ports.empty() ? "connect it first" : suggestion(port, ports));
 }
 
 }  // namespace vrpipe

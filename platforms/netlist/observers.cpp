@@ -43,7 +43,7 @@ void Observers::check(const Netlist& netlist) const {
     }
     if (found) continue;
     throw UserError("cannot observe link '" + wanted.name + "'", "observers", "the platform has no such link",
-                    names.empty() ? "it has none" : "did you mean " + nearest_name(wanted.name, names) + "?");
+                    names.empty() ? "it has none" : suggestion(wanted.name, names));
   }
 }
 

@@ -51,7 +51,7 @@ Fidelity fidelity_named(const std::string& name) {
     names.emplace_back(name_of(fidelity));
   }
   throw UserError("unknown fidelity '" + name + "'", "--fidelity", "this build has no such fidelity",
-                  fmt::format("did you mean {}? There are {}", nearest_name(name, names), fmt::join(names, ", ")));
+                  suggestion(name, names));
 }
 
 void choose_fidelity(RunRequest& request, const std::string& text) {
@@ -148,8 +148,7 @@ const Variant& variant_named(const std::string& name) {
       names.push_back(variant.name);
     }
   }
-  throw UserError("unknown variant '" + name + "'", "--variant", "there is no such variant",
-                  fmt::format("did you mean {}? There are {}", nearest_name(name, names), fmt::join(names, ", ")));
+  throw UserError("unknown variant '" + name + "'", "--variant", "there is no such variant", suggestion(name, names));
 }
 
 namespace {

@@ -98,7 +98,7 @@ void StatisticSampler::find(const Observers& observers) {
       }
       if (series.known.size() > before) continue;
       throw UserError("cannot sample '" + name + "'", "statistics", "the platform has none of this name",
-                      known_.empty() ? "it has none" : "did you mean " + nearest_name(name, this->names()) + "?");
+                      known_.empty() ? "it has none" : suggestion(name, this->names()));
     }
     for (const std::size_t i : series.known) series.given.push_back({known_[i].name, known_[i].kind, {}, {}});
   }

@@ -139,14 +139,36 @@ TEST(Registry, APluginThatIsMissingOrForeignIsRefused) {
   EXPECT_THROW(load_plugin("/proc/self/exe/"), UserError);
 }
 
-TEST(NearestName, IsTheOneWithTheFewestEdits) {
-  const std::vector<std::string> names{"baseline", "qm", "het", "het+qm"};
-  EXPECT_EQ(nearest_name("hte", names), "het");
-  EXPECT_EQ(nearest_name("basline", names), "baseline");
-  EXPECT_EQ(nearest_name("qn", names), "qm");
-  EXPECT_EQ(nearest_name("x", std::vector<std::string>{}), "");
+TEST(NearName, IsTheOneWithTheFewestEditsOfAThirdOfTheLettersAtMost) {
+  const std::vector<std::string> names{"baseline", "qm", "het", "het+qm", "raster.hi_z"};
+  EXPECT_EQ(near_name("hte", names), "het");
+  EXPECT_EQ(near_name("basline", names), "baseline");
+  EXPECT_EQ(near_name("qn", names), "qm");
+  EXPECT_EQ(near_name("x", {}), "");
+  EXPECT_EQ(near_name("", names), "");
+  EXPECT_EQ(near_name("foo", names), "");
+  EXPECT_EQ(near_name("hurt", names), "");
+  EXPECT_EQ(near_name("baslne", names), "baseline");
+  EXPECT_EQ(near_name("bsllne", names), "");
+  EXPECT_EQ(near_name("hi_z", names), "raster.hi_z");
+  EXPECT_EQ(near_name("rop.hi_z", names), "");
   EXPECT_EQ(edit_distance("kitten", "sitting"), 3u);
+  EXPECT_EQ(edit_distance("base", "bsae"), 1u);
   EXPECT_EQ(edit_distance("", "abc"), 3u);
+}
+
+TEST(Suggestion, NamesWhatIsNearAndElseWhatThereIs) {
+  const std::vector<std::string> names{"lego", "room"};
+  EXPECT_EQ(suggestion("lgeo", names), "did you mean lego? There are lego, room");
+  EXPECT_EQ(suggestion("foo", names), "there are lego, room");
+  EXPECT_EQ(suggestion("lgeo", names, "`list` lists all", "a:"), "did you mean a:lego? `list` lists all");
+  EXPECT_EQ(suggestion("foo", names, "`list` lists all", "a:"), "there are a:lego, a:room; `list` lists all");
+  EXPECT_EQ(suggestion("foo", {"lego", "room", "lego"}), "there are lego, room");
+  std::vector<std::string> many{"something"};
+  for (int i = 1; i < 100; ++i) many.push_back("something" + std::to_string(i));
+  EXPECT_EQ(suggestion("foo", many, "`list` lists all"), "`list` lists all");
+  EXPECT_EQ(suggestion("foo", many), "there are 100, such as something");
+  EXPECT_EQ(suggestion("foo", {}), "there is none");
 }
 
 TEST(UserError, IsOneLineThatNamesThingPlaceReasonAndRemedy) {

@@ -219,8 +219,9 @@ TEST_F(MeshFile, FilesThatAreNoMeshesAreRefused) {
   expect_refused("lying.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", {"no triangle", "1 have indices beyond"});
   expect_refused("words.obj", "v 0 zero 0\n", {"`v 0` is malformed"});
   expect_refused("words.obj", "v 0 0 0\nf 1 1/2/3/4 1\n", {"`f 1` is malformed"});
-  expect_refused("text.gltf", "hello", {"not valid JSON"});
-  expect_refused("text.glb", "hello", {"not valid JSON"});
+  expect_refused("text.gltf", "hello", {"it is no glTF: it begins neither"});
+  expect_refused("cut.gltf", " {", {"not valid JSON"});
+  expect_refused("text.glb", "hello", {"it is no glTF: it begins neither"});
   expect_refused("text.ply", "hello", {"does not begin with a line `ply`"});
   expect_refused("mesh.stl", "solid", {"`.stl`", "give an .obj, .ply, .gltf or .glb"});
   expect_refused("mesh", "v 0 0 0", {"no extension"});

@@ -38,6 +38,7 @@ class BadInput : public ToolTest {
                                   "ELF...vrpipe-plugin/0.0.0/itanium-abi") +
                           '\0' + "...");
     write("file", "neither Gaussians nor a mesh");
+    write("junk.glb", "neither Gaussians nor a mesh");
     std::filesystem::create_directory(folder() / "folder.ply");
   }
 
@@ -108,6 +109,9 @@ TEST_F(BadInput, Scenes) {
   refused_with_outputs({"compare", "--scene", "cut.ply"}, {"cut.ply"});
   refused_with_outputs({"run", "--scene", "cut.spl"}, {"cut.spl", "60 splats"});
   refused_with_outputs({"run", "--scene", "other.ply"}, {"other.ply", "opacity"});
+  refused_with_outputs({"run", "--scene", "missing.glb"}, {"missing.glb", "no such file"});
+  for (const char* option : {"--scene", "--mesh"})
+    refused_with_outputs({"run", option, "junk.glb"}, {"junk.glb", "it is no glTF"});
   refused_with_outputs({"run", "--scene", "folder.ply"}, {"folder.ply", "directory"});
   refused_with_outputs({"run", "--scene", "file"}, {"file", "known format", ".ply"});
   refused_with_outputs({"run", "--scene", "builtin:objekt"}, {"builtin:objekt", "object"});
@@ -163,7 +167,7 @@ TEST_F(BadInput, Machines) {
   refused_with_outputs({"run", "--platform", "agx-orim"}, {"'agx-orim'", "did you mean agx-orin?"});
   refused_with_outputs({"run", "--platform", "agx-orin-lpddr3"}, {"agx-orin has its memory now; give agx-orin"});
   refused_with_outputs({"run", "--variant", "hett"}, {"'hett'", "het+qm"});
-  refused_with_outputs({"run", "--fidelity", "exact"}, {"'exact'", "There are functional, bound, lt, cycle"});
+  refused_with_outputs({"run", "--fidelity", "exact"}, {"'exact'", "there are functional, bound, lt, cycle"});
   refused_with_outputs({"run", "--format", "rgb10"}, {"'rgb10'", "rgba16f"});
   refused_with_outputs({"run", "--termination", "late"}, {"'late'", "strict"});
   refused_with_outputs({"compare", "--set", "tcc.bins=1"}, {"'tcc'", "did you mean"});
@@ -184,6 +188,21 @@ TEST_F(BadInput, Machines) {
   refused({"units", "--slot", "tcc"}, {"'tcc'", "did you mean"});
 }
 
+// Nothing that was not meant is suggested.
+TEST_F(BadInput, NamesLikeNoOther) {
+  for (const auto& [arguments, parts] : std::vector<std::pair<std::vector<std::string>, std::vector<std::string>>>{
+           {{"run", "--unit", "foo=pairing"}, {"'foo'", "no such slot; ", "`vrpipe units` lists all"}},
+           {{"run", "--log", "foo"}, {"'foo'", "no such unit; `vrpipe units` lists all"}},
+           {{"accuracy", "--quick", "--at-cycle", "foo"}, {"'foo'", "has none; `vrpipe units` lists all"}},
+           {{"run", "--platform", "foo"}, {"'foo'", "no such platform; there are agx-orin, "}},
+           {{"convert", "nofile", "x.ply"}, {"no such file; check the path; of built-in scenes there are builtin:"}},
+           {{"run", "--scene", "builtin:"}, {"(builtin:)", "there is none of that name; there are builtin:"}},
+           {{"reproduce", "--scene", "foo=good.ply"}, {"(foo=good.ply)", "to put a file in its place; there are "}}}) {
+    refused(arguments, parts);
+    EXPECT_EQ(vrpipe(arguments).err.find("did you mean"), std::string::npos) << arguments.back();
+  }
+}
+
 // What would be taken, reported and mean nothing.
 TEST_F(BadInput, SettingsWithoutMeaning) {
   refused({"microbench", "kill-rate", "--set", "state.termination_threshold=0.1"},
@@ -200,7 +219,8 @@ TEST_F(BadInput, SettingsWithoutMeaning) {
 
 TEST_F(BadInput, Effects) {
   const std::vector<std::pair<const char*, std::vector<std::string>>> lists{
-      {"al", {"unknown effect 'al'", "`vrpipe units` lists all"}},
+      {"alll", {"unknown effect 'alll'", "did you mean all?"}},
+      {"all,-nope", {"unknown effect 'nope'", "nothing declares it; `vrpipe units --effects` lists all"}},
       {"hi_z", {"unknown effect 'hi_z'", "did you mean raster.hi_z?"}},
       {"all,-raster.hiz", {"unknown effect 'raster.hiz'", "did you mean raster.hi_z?"}},
       {",", {"--effects ,", "a name is empty"}},

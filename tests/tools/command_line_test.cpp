@@ -65,6 +65,23 @@ TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
   expect_in(vrpipe({"convert", "--help"}).out, {"IN", "OUT", ".splat"});
 }
 
+// Without a plugin, as one who reads it would.
+TEST_F(CommandLine, TheVariantThatHelpGivesAsAnExampleCanBeDrawn) {
+  for (const char* command : {"run", "compare", "sweep"}) {
+    SCOPED_TRACE(command);
+    const std::string help = vrpipe({command, "--help"}).out;
+    const std::size_t start = help.find("mine=het+qm,");
+    ASSERT_NE(start, std::string::npos);
+    expect_in(help, {"het+qm", "in-shader", "in-shader-no-lock", "software", "accelerator"});
+    const std::string example = help.substr(start, help.find_first_of(" ;\n", start) - start);
+    const Finished finished = vrpipe({"run", "--scene", "tiny.spl", "--fidelity", "functional", "--variant", example});
+    EXPECT_EQ(finished.code, 0) << finished.err;
+    // Of a value that is no definition, which names the same example.
+    const std::string error = vrpipe({"run", "--variant", "mine="}).err;
+    EXPECT_NE(error.find("--variant " + example), std::string::npos) << error;
+  }
+}
+
 TEST_F(CommandLine, ScenesAreMeasuredByTheirCounts) {
   const nlohmann::json measured = json_of({"scenes", "--measure", "--scene", "courtyard", "--scene", "lego=tiny.spl"});
   EXPECT_EQ(measured["schema"], "vrpipe.scene_measurements/1");

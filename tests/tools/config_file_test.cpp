@@ -1,6 +1,7 @@
 // Configuration files: what they say, what the command line says instead, and what --print-config writes.
 #include "tool_test_support.h"
 
+#include <array>
 #include <regex>
 #include <sstream>
 
@@ -112,6 +113,34 @@ TEST_F(ConfigFile, GivesWayToTheCommandLineKeyByKey) {
   EXPECT_EQ(result["platform"]["origins"]["tc.bin_quads"], "file");
 }
 
+TEST_F(ConfigFile, IsCheckedWhereTheCommandLineSaysOtherwise) {
+  for (const auto& [line, option, value] :
+       std::vector<std::array<const char*, 3>>{{"fidelity = \"bogus\"", "--fidelity", "lt"},
+                                               {"platform = \"bogus\"", "--platform", "mobile"},
+                                               {"size = 3", "--size", "32x32"},
+                                               {"fovy = nan", "--fovy", "40"},
+                                               {"eye = [0, 1]", "--eye", "0,0,-4"},
+                                               {"variant = \"hat\"", "--variant", "het"},
+                                               {"format = \"rgb\"", "--format", "rgba8"},
+                                               {"termination = \"late\"", "--termination", "strict"},
+                                               {"effects = \"alll\"", "--effects", "auto"},
+                                               {"background = \"2,0,0\"", "--background", "0,0,0"},
+                                               {"multi-pass = 0", "--multi-pass", "2"},
+                                               {"views = \"some\"", "--views", "2"},
+                                               {"jobs = 0", "--jobs", "1"},
+                                               {"interval = 0", "--interval", "100"},
+                                               {"set.tc.bins = 0", "--set", "tc.bins=3"},
+                                               {"set.tc.binz = 1", "--set", "tc.binz=3"},
+                                               {"unit.qru = \"bogus\"", "--unit", "qru=pairing"}}) {
+    SCOPED_TRACE(line);
+    write("config.toml", "\n" + std::string(line) + "\n");
+    refused({"compare", "--config", "config.toml", option, value}, {"config.toml:2, "});
+  }
+  // A mistake of the command line is not the file's.
+  write("config.toml", "size = \"32x32\"\n");
+  EXPECT_EQ(vrpipe({"run", "--config", "config.toml", "--size", "3"}).err.find("config.toml"), std::string::npos);
+}
+
 TEST_F(ConfigFile, DefinesVariantsThatStandBesideTheFourInItsOrder) {
   const json result =
       with("scene = \"tiny.spl\"\n[variants.z]\nbase = \"qm\"\n[variants.a]\nbase = \"z\"\n", "compare");
@@ -127,6 +156,15 @@ TEST_F(ConfigFile, DefinesVariantsThatNameUnitsOfGpcsOfTheirOwn) {
       "[variants.two]\nbase = \"qm\"\nset.platform.gpcs = 2\nunit.\"gpc1.qru\" = \"pass-through\"\n",
       "run");
   EXPECT_EQ(result["platform"]["parameters"]["platform.gpcs"], 2);
+}
+
+TEST_F(ConfigFile, DefinesVariantsInAnyOrder) {
+  const json result = with(
+      "scene = \"tiny.spl\"\nvariant = [\"a\", \"b\"]\n[variants.a]\nbase = \"b\"\nset.tgc.bins = 4\n"
+      "[variants.b]\nbase = \"c\"\nset.tc.bins = 3\n",
+      "compare", {"--variant", "a", "--variant", "b", "--variant", "c=qm"});
+  EXPECT_EQ(result["runs"][0]["changes"]["base"], "b");
+  EXPECT_EQ(result["runs"][0]["changes"]["set"], json({{"tc.bins", "3"}, {"tgc.bins", "4"}}));
 }
 
 TEST_F(ConfigFile, MayBeOverruledInWhatItDefines) {
@@ -239,12 +277,16 @@ TEST_F(ConfigFile, ThatCannotBeUsedIsRefusedWithItsLine) {
   bad("scene = \"tiny.spl\"\n\nsize = \"32\"\n", {"config.toml:3", "--size", "WIDTHxHEIGHT"});
   bad("[set]\n\ntc.bin = 4\n", {"'bin'", "config.toml:3", "tc.bins"});
   bad("[set]\ntc.bins = 0\n", {"config.toml:2", "tc.bins"});
+  bad("[set]\n\ntc = 3\n", {"'tc'", "config.toml:3", "no UNIT.PARAMETER"});
+  bad("[set]\ntc.bins = true\n", {"bad value 'true' (config.toml:2, tc.bins)"});
   bad("[set]\nnowhere.bins = 1\n", {"config.toml:2", "nowhere"});
   bad("[unit]\nqru = \"nothing\"\n", {"config.toml:2", "nothing"});
   bad("[variants.a]\nbase = \"hat\"\n", {"config.toml:", "'hat'", "did you mean het"});
   bad("[variants.a]\nbsae = \"het\"\n", {"config.toml:2", "'bsae'", "did you mean base"});
   bad("[variants.a]\nset.tc.bins = 1\n", {"config.toml:", "has no base"});
   bad("[variants.a]\nbase = \"het\"\nset.tc.bin = 1\n", {"config.toml:3", "'bin'"});
+  bad("[variants.a]\nbase = \"b\"\n[variants.b]\nbase = \"a\"\n", {"config.toml:", "based on itself: a on b on a"});
+  bad("[variants.a]\nbase = \"a\"\n", {"config.toml:1", "based on itself: a on a"});
   bad("variants = 3\n", {"config.toml:1", "table"});
   bad("explain-effects = 3\n", {"config.toml:1", "true or false"});
   bad("fidelity = 2020-01-01\n", {"config.toml:1", "fidelity"});
@@ -258,7 +300,7 @@ TEST_F(ConfigFile, ThatCannotBeUsedIsRefusedWithItsLine) {
   bad("[" + deep + "]\n", {"config.toml:1", "more than 64 parts"});
   bad("set = { " + deep + " = 1 }\n", {"config.toml:1", "more than 64 parts"});
   refused({"run", "--config", "nowhere.toml"}, {"nowhere.toml", "no such file"});
-  refused({"run", "--config", "."}, {"cannot read configuration"});
+  refused({"run", "--config", "."}, {"cannot read configuration (--config .): it is a directory"});
   refused({"units", "--config", "config.toml"}, {"--config"});
 }
 

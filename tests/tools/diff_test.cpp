@@ -110,6 +110,7 @@ TEST_F(Diff, RefusesWhatIsNoResult) {
   refused({"diff", "a.json", "list.json"}, {"list.json", "no schema of vrpipe"});
   refused({"diff", "other.json", "a.json"}, {"other.json"});
   refused({"diff", "a.json", "broken.json"}, {"broken.json", "no JSON from byte"});
+  refused({"diff", "nowhere.json", "broken.json"}, {"nowhere.json", "no such file"});
   refused({"diff", "a.json", "."}, {"cannot read result"});
   refused({"diff", "a.json"}, {"B.json"});
   refused({"diff", "a.json", "a.json", "--json", "a.json"}, {"--json"});

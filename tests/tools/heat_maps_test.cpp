@@ -115,6 +115,26 @@ TEST_F(HeatMapFiles, AreWrittenForEachVariant) {
   EXPECT_GT(sum(channel("o/tiny-qm-pixels.exr", "merged", 48, 40)), 0);
 }
 
+// Kernels neither merge nor signal.
+TEST_F(HeatMapFiles, OfSoftwareAreOfWhatItTells) {
+  EXPECT_EQ(vrpipe({"run", "--scene", "builtin:object", "--size", "48x40", "--variant", "software", "--output", "o",
+                    "--heat-maps"})
+                .code,
+            0);
+  const json legend = json::parse(read_file(folder() / "o/object-software-heat-maps.json"));
+  for (const char* of : {"pixels", "tiles"}) {
+    const std::string stem = std::string("o/object-software-") + of + "-";
+    for (const char* map : {"rasterized", "blended"}) {
+      EXPECT_TRUE(std::filesystem::exists(folder() / (stem + map + ".png"))) << map;
+      EXPECT_GT(legend[of][map]["sum"], 0) << map;
+    }
+    for (const char* map : {"merged", "termination_cycle"}) {
+      EXPECT_FALSE(std::filesystem::exists(folder() / (stem + map + ".png"))) << map;
+      EXPECT_FALSE(legend[of].contains(map)) << map;
+    }
+  }
+}
+
 TEST_F(HeatMapFiles, AreRefusedWithoutAFolder) {
   refused({"run", "--scene", "tiny.spl", "--heat-maps"}, {"--heat-maps", "add --output DIR"});
   refused({"run", "--scene", "tiny.spl", "--heat-maps=2", "--output", "o"}, {"--heat-maps", "it is a switch"});

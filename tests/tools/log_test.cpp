@@ -78,6 +78,8 @@ TEST_F(Log, RefusesWhatItCannotLog) {
   refused_here({"--log", "gpc1.crop"}, {"'gpc1.crop'", "did you mean gpc0.crop?"});
   refused_here({"--log", "l2"}, {"'l2'", "a memory has no states"});
   refused_here({"--log", "crop@7:7"}, {"'@7:7'", "it ends before it begins"});
+  refused_here({"--log", "crop@9999999:"}, {"--log crop@9999999:", "the run ends after", "begin earlier"});
+  refused_here({"--log", "crop@9999999:", "--log-file", "log.txt"}, {"--log crop@9999999:", "the run ends after"});
   refused_here({"--log", "crop", "--fidelity", "functional"}, {"--log", "functional", "use lt or cycle"});
   refused_here({"--log-file", "log.txt"}, {"--log-file", "add --log UNIT"});
   refused_here({"--log", "crop", "--log-file", "no/log.txt"}, {"--log-file no/log.txt", "no folder no"});

@@ -47,7 +47,7 @@ TEST_F(MultiPassOption, WhatIsNoNumberOfPassesIsRefused) {
 TEST_F(MultiPassOption, MorePassesThanSplatsAreRefused) {
   for (const char* command : {"run", "compare"}) {
     refused({command, "--scene", "tiny.spl", "--output", "images", "--multi-pass", "61"},
-            {"--multi-pass", "60 splats"});
+            {"--multi-pass", "60 splats", "as many as there are splats, 16384 at most"});
   }
 }
 

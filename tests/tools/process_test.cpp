@@ -14,6 +14,7 @@
 #include "forked.h"
 #include "host/output_file.h"
 #include "host/process_setup.h"
+#include "jobs/journal.h"
 #include "qru/qru.h"
 
 namespace vrpipe::testing {
@@ -156,6 +157,12 @@ TEST_F(Process, AnInterruptionSaysWhatWasWrittenAndLeavesNothingElse) {
   EXPECT_EQ(some.err, "\r\x1b[Jvrpipe: interrupted; written: a, b\\n, c, d and 2 more\n");
   EXPECT_EQ(files(), (std::vector<std::string>{"a", "b\n", "c", "d", "e", "f", "tiny.spl"}));
   EXPECT_EQ(read_file(folder() / "a"), "text");
+  const Finished journal = forked([] {
+    set_up_process();
+    tools::Journal::in_file("j.jsonl", {{"schema", "some"}}, "--journal");
+    return ::raise(SIGINT);
+  });
+  EXPECT_EQ(journal.err, "vrpipe: interrupted; written: j.jsonl; the same command goes on from there\n");
 }
 
 TEST_F(Process, AnInterruptedChildLeavesItsParentsFilesAlone) {

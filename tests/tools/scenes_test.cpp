@@ -50,6 +50,16 @@ TEST_F(Scenes, TheViewOfAFileCanBeGivenBack) {
   EXPECT_EQ(hash(), automatic);
 }
 
+TEST_F(Scenes, HaveNumbersAndWordsAsOneWouldWriteThem) {
+  const Finished converted = vrpipe({"convert", "ball.ply", "ball.splat"});
+  EXPECT_NE((converted.out + converted.err).find("spherical harmonics of degree 1 are left out"), std::string::npos)
+      << converted.out << converted.err;
+  const Finished drawn = vrpipe({"run", "--scene", "ball.ply", "--size", "32x32", "--fovy", "10", "--fidelity",
+                                 "functional", "--html", "ball.html"});
+  EXPECT_EQ(drawn.code, 0) << drawn.err;
+  EXPECT_NE(read_file(folder() / "ball.html").find(", 10 degrees high"), std::string::npos);
+}
+
 TEST_F(Scenes, OfAFileAreInJsonAsWell) {
   const nlohmann::json listed = nlohmann::json::parse(vrpipe({"scenes", "ball.ply", "--json", "-"}).out);
   EXPECT_EQ(listed["schema"], "vrpipe.scene/1");

@@ -100,7 +100,7 @@ TEST_F(Sweep, ItsPageHasVariantsBySceneWithTheirGeometricMean) {
 
 TEST_F(Sweep, NamesThePointThatCannotBe) {
   bad(small_sweep + "[axes]\nvariant = [\"baseline\", \"qm\"]\ntgc.bins = [4, 0]\n",
-      {"'0'", "of the point variant=qm, tgc.bins=0", "give a whole number"});
+      {"'0'", "study.toml:", "of the point variant=qm, tgc.bins=0", "give a whole number"});
   bad(small_sweep + "[axes]\nvariant = [\"baseline\", \"qm\"]\ntgc.binz = [4]\n",
       {"'binz'", "of the point variant=baseline, tgc.binz=4", "did you mean tgc.bins"});
 }
@@ -417,12 +417,14 @@ TEST_F(Sweep, ThatCannotBeIsRefusedWithItsLine) {
   bad("pareto = [\"cycles\", \"-cycles\"]\n[axes]\ntc.bins = [3]\n", {"study.toml:1", "it has cycles twice"});
   bad("[[points]]\ntc.bins = 4\n[axes]\ntc.bins = [4]\n", {"points and axes"});
   bad("sise = \"3x3\"\n[axes]\ntc.bins = [4]\n", {"unknown key 'sise'", "study.toml:1", "did you mean size"});
-  bad("[axes]\ntc.bins = [0]\n", {"tc.bins", "from 1 to"});
-  bad("[axes]\ntc.bin = [3]\n", {"'bin'", "tc.bins"});
-  bad("[axes]\nvariant = [\"hat\"]\n", {"'hat'", "het"});
-  bad("[axes]\nplatform = [\"moby\"]\n", {"'moby'", "mobile"});
-  bad("[axes]\nview = [\"left\"]\n", {"'left'", "axis view"});
-  bad("[axes]\nsize = [\"3\"]\n", {"axis size"});
+  bad("[axes]\ntc.bins = [0]\n", {"study.toml:2", "tc.bins", "from 1 to"});
+  bad("[axes]\ntc.bins = { from = 0, to = 4, step = 4 }\n", {"study.toml:2", "tc.bins", "from 1 to"});
+  bad("[axes]\ntc.bin = [3]\n", {"'bin'", "study.toml:2", "tc.bins"});
+  bad("[[points]]\ntc.bins = 3\n[[points]]\ntc.bins = 0\n", {"study.toml:4", "tc.bins", "from 1 to"});
+  bad("[axes]\nvariant = [\"hat\"]\n", {"'hat'", "study.toml:2", "het"});
+  bad("[axes]\nplatform = [\"moby\"]\n", {"'moby'", "study.toml:2", "mobile"});
+  bad("[axes]\nview = [\"left\"]\n", {"'left'", "study.toml:2", "axis view"});
+  bad("[axes]\nsize = [\"3\"]\n", {"study.toml:2", "axis size"});
   bad("[variants.m]\nbase = \"qm\"\nset.tc.bins = 3\n[axes]\nvariant = [\"m\"]\ntc.bins = [3, 4]\n",
       {"axis tc.bins changes nothing", "variant m"});
   bad("pareto = [\"speed\", \"cycles\"]\n" + small_sweep + "[axes]\ntc.bins = [3]\n", {"'speed'", "pareto"});
@@ -435,7 +437,8 @@ TEST_F(Sweep, ThatCannotBeIsRefusedWithItsLine) {
   refused({"sweep", "study.toml", "--shard", "1/2", "--journal", "j", "--csv", "s.csv"},
           {"--csv", "a shard has not all points"});
   refused({"sweep", "study.toml", "--csv", "study.toml"}, {"study.toml"});
-  refused({"sweep", "nowhere.toml"}, {"nowhere.toml"});
+  refused({"sweep", "nowhere.toml"}, {"cannot read study (nowhere.toml): there is no such file"});
+  refused({"sweep", "."}, {"cannot read study (.): it is a directory"});
   refused({"sweep"}, {"STUDY.toml"});
 }
 

@@ -81,6 +81,20 @@ TEST(Text, TheLastColumnOfATableIsWrappedToItsWidth) {
             "             there is room for\n");
 }
 
+TEST(Text, LinesBelowARowAreAsWideAsTheyAreAskedToBe) {
+  TextTable table({"", "n"});
+  table.row({"a", "1"});
+  table.below("of more words than there is room for", 26);
+  table.row({"b", "22"});
+  EXPECT_EQ(table.text({}),
+            "      n\n"
+            "-------\n"
+            "  a   1\n"
+            "      of more words than\n"
+            "      there is room for\n"
+            "  b  22\n");
+}
+
 TEST(Text, ProgressFitsItsLine) {
   const std::vector<std::string> names{"baseline", "qm", "het", "het+qm"};
   for (unsigned width : {10U, 50U, 79U, 200U}) {

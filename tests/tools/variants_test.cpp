@@ -84,6 +84,26 @@ TEST_F(Variants, OfSeveralPlatformsAreComparedInSimulatedTime) {
   }
 }
 
+// A unit for all is taken by those that have none of their own in its place; of none there is no use.
+TEST_F(Variants, KeepAUnitOfTheirOwn) {
+  for (const char* slot : {"crop", "gpc0.crop"}) {
+    const std::string unit = std::string(slot) + "=color-rop";
+    refused({"run", "--scene", "tiny.spl", "--variant", "in-shader", "--unit", unit},
+            {"--unit " + unit, "variant in-shader has a unit of its own in slot crop, in-shader"});
+  }
+  refused({"compare", "--scene", "tiny.spl", "--variant", "in-shader", "--variant", "own=in-shader", "--unit",
+           "crop=color-rop"},
+          {"--unit crop=color-rop", "a unit of its own in slot crop"});
+  refused({"run", "--scene", "tiny.spl", "--variant", "own=het,tgc=pass-through", "--unit", "tgc=tile-grid-coalescing"},
+          {"variant own has a unit of its own in slot tgc"});
+  const std::vector<std::string> both{"compare",   "--scene",   "tiny.spl", "--variant",     "baseline",
+                                      "--variant", "in-shader", "--unit",   "crop=color-rop"};
+  const json result = json_of(both);
+  EXPECT_EQ(result["runs"][0]["implementations"]["crop"], "color-rop");
+  EXPECT_EQ(result["runs"][1]["implementations"]["crop"], "in-shader");
+  EXPECT_NE(vrpipe(both).out.find("crop=color-rop (not in in-shader, with its own)"), std::string::npos);
+}
+
 TEST_F(Variants, HaveImagesOfTheirOwn) {
   const Finished finished = vrpipe({"compare", "--scene", "tiny.spl", "--platform", "agx-orin", "--platform", "mobile",
                                     "--variant", "mine=het,tc.bins=2", "--fidelity", "functional", "--output", "out"});

@@ -33,7 +33,7 @@ TEST(SceneSubstitution, APathWithAnEqualsSignIsAPath) {
 
 TEST(SceneSubstitution, AnUnknownNameGetsTheNearest) {
   expect_user_error([] { scene_substitution("trian=model.ply"); },
-                    {"unknown built-in scene (trian=model.ply)", "did you mean train=model.ply?", "./trian=model.ply"});
+                    {"unknown built-in scene (trian=model.ply)", "did you mean train?", "./trian=model.ply"});
   expect_user_error([] { scene_substitution("train="); }, {"no file is named", "train=FILE"});
   expect_user_error([] { scene_substitution("train=builtin:truck"); }, {"`builtin:truck` is a built-in scene as well"});
 }

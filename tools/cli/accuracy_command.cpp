@@ -40,6 +40,7 @@ class AccuracyCommand : public Command {
                          "measures each rung of the fidelity ladder N times, interleaved, and\n"
                          "takes the median of the seconds (default: 1)",
                          ladders);
+    arguments.find("--repeat")->check = [](const std::string& text) { parse_count(text, "--repeat", largest_repeat); };
     arguments.add_option("--at-cycle", at_cycle_, "UNIT,...",
                          "a rung with these units at cycle among others at lt; can be repeated\n"
                          "(default: zrop,crop)",

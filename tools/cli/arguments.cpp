@@ -64,13 +64,6 @@ std::vector<std::string> option_names(const CLI::App& app) {
   return names;
 }
 
-/// The name meant, when one is near enough to be a misspelling.
-std::string likely_name(const std::string& given, const std::vector<std::string>& known) {
-  const std::string nearest = nearest_name(given, known);
-  const std::size_t limit = std::max<std::size_t>(2, given.size() / 3);
-  return !nearest.empty() && edit_distance(given, nearest) <= limit ? nearest : std::string();
-}
-
 [[noreturn]] void refuse_option(const std::string& given, const CLI::App& app, const std::string& where,
                                 const std::vector<CLI::App*>& commands) {
   const std::string option = given.substr(0, given.find('='));
@@ -82,7 +75,7 @@ std::string likely_name(const std::string& given, const std::vector<std::string>
     throw UserError("unknown option '" + option + "'", where, "it is an option of " + owner,
                     app.get_parent() == nullptr ? "write it after the command" : help);
   }
-  const std::string nearest = likely_name(option, option_names(app));
+  const std::string nearest = near_name(option, option_names(app));
   if (!nearest.empty() && nearest != option) {
     throw UserError("unknown option '" + option + "'", where, "there is no such option",
                     "did you mean " + nearest + "? " + help);
@@ -116,7 +109,7 @@ void refuse_leftovers(const CLI::App& app, const std::vector<CLI::App*>& command
   }
   std::vector<std::string> names;
   for (const CLI::App* command : commands) names.push_back(command->get_name());
-  const std::string nearest = likely_name(first, names);
+  const std::string nearest = near_name(first, names);
   throw UserError("unknown command '" + first + "'", where, "there is no such command",
                   (nearest.empty() ? std::string() : "did you mean " + nearest + "? ") +
                       fmt::format("use one of {}", fmt::join(names, ", ")));

@@ -38,7 +38,9 @@ struct Option {
   bool is_required = false;
   std::string default_text = {};    ///< what stands for it where it is not given, for --print-config; empty: none
   std::string default_unless = {};  ///< an option beside which nothing does
-  Values texts = {};                ///< as given; of a flag "true", as often as it is there
+  /// Throws UserError for a text that is no value whatever else is given; may be empty.
+  std::function<void(const std::string&)> check = {};
+  Values texts = {};  ///< as given; of a flag "true", as often as it is there
 
   bool is_given() const { return !texts.empty(); }
   /// These texts are given, and no others.

@@ -7,6 +7,7 @@
 
 #include <vrpipe/component/error.h>
 
+#include "host/command_failure.h"
 #include "jobs/toml_file.h"
 #include "jobs/user_variants.h"
 
@@ -22,16 +23,27 @@ const std::string variants_key = "variants";
 /// Of the file, with what the readers of its parts need.
 class ConfigReader : public TomlFile {
  public:
+  /// Of a command without --config the file is a study.
   ConfigReader(const std::filesystem::path& path, const Arguments& arguments)
-      : TomlFile(path, "cannot read configuration", std::string(config_option) + " " + path.string(),
-                 "docs/configuration.md"),
-        arguments_(arguments) {}
+      : ConfigReader(path, arguments, arguments.find(config_option) == nullptr) {}
 
   [[noreturn]] void refuse_key(const toml::node& node, const std::string& key,
                                const std::vector<std::string>& known) const {
     refuse(node, "unknown key '" + key + "'", "there is no such key here",
-           fmt::format("did you mean {}? `vrpipe {} --help` lists the options", nearest_name(key, known),
-                       arguments_.command()));
+           suggestion(key, known, fmt::format("`vrpipe {} --help` lists the options", arguments_.command())));
+  }
+
+  /// Of tables, lists of tables and lists of values, by dotted paths; not of what is neither text, number nor switch.
+  template <class See>
+  void for_each_value(const toml::node& node, const See& see, const std::string& name = "") const {
+    if (const toml::table* const table = node.as_table()) {
+      if (const toml::node* const from = table->get("from")) return see(name, *from);
+      for (const auto& [path, leaf] : leaves(*table, "from")) for_each_value(*leaf, see, path);
+    } else if (const toml::array* const list = node.as_array()) {
+      for (const toml::node& each : *list) for_each_value(each, see, name);
+    } else if (!name.empty() && (node.is_string() || node.is_number() || node.is_boolean())) {
+      see(name, node);
+    }
   }
 
   const toml::table& table(const toml::node& node, const std::string& key) const {
@@ -65,6 +77,12 @@ class ConfigReader : public TomlFile {
   }
 
  private:
+  ConfigReader(const std::filesystem::path& path, const Arguments& arguments, bool is_study)
+      : TomlFile(path, is_study ? "cannot read study" : "cannot read configuration",
+                 is_study ? path.string() : std::string(config_option) + " " + path.string(),
+                 is_study ? "docs/studies.md" : "docs/configuration.md"),
+        arguments_(arguments) {}
+
   const Arguments& arguments_;
 };
 
@@ -100,17 +118,30 @@ void ConfigFile::read(Arguments& arguments, const std::vector<std::string>& othe
     if (std::find(special.begin(), special.end(), option.name) == special.end()) known.push_back(option.name.substr(2));
   }
   known.insert(known.end(), others.begin(), others.end());
+  const auto mention_node = [&](const std::string& entry, const std::string& key, const toml::node& node) {
+    const std::string value = reader.scalar(node, key);
+    const auto flag = node.value_exact<bool>();
+    mention(entry, key, value, flag ? (*flag ? "true" : "false") : value, node.source().begin.line);
+  };
   for (const auto& [key, node] : ConfigReader::in_order(reader.root())) {
-    if (std::find(others.begin(), others.end(), key) != others.end()) continue;
+    if (std::find(others.begin(), others.end(), key) != others.end()) {
+      reader.for_each_value(*node, [&](const std::string& name, const toml::node& value) {
+        for (const std::string& called : {name, "axis " + name, "--" + name}) mention_node("", called, value);
+      });
+      continue;
+    }
     const unsigned line = ConfigReader::position(*node).line;
     const Option* const option = arguments.find("--" + key);
     if (std::find(known.begin(), known.end(), key) == known.end()) reader.refuse_key(*node, key, known);
     if (key == settings_key || key == units_key) {
       if (option == nullptr) reader.refuse_key(*node, key, known);
       for (const auto& [path, leaf] : TomlFile::leaves(reader.table(*node, key))) {
-        const std::string value = reader.scalar(*leaf, path);
-        add("--" + key, path, path + "=" + value, leaf->source().begin.line);
-        mention(path, value, leaf->source().begin.line);
+        if (key == settings_key && path.find('.') == std::string::npos) {
+          reader.refuse(*leaf, "unknown key '" + path + "' of [set]", "it is no UNIT.PARAMETER",
+                        "write e.g. tc.bins = 64; `vrpipe units` lists all");
+        }
+        add("--" + key, path, path + "=" + reader.scalar(*leaf, path), leaf->source().begin.line);
+        mention_node("--" + key + " " + path, path, *leaf);
       }
     } else if (key == variants_key) {
       for (const auto& [name, each] : ConfigReader::in_order(reader.table(*node, key))) {
@@ -118,8 +149,7 @@ void ConfigFile::read(Arguments& arguments, const std::vector<std::string>& othe
         add("--define", name, text_of(definition), ConfigReader::position(*each).line);
         for (const auto& [path, leaf] : TomlFile::leaves(*each->as_table())) {
           const std::size_t dot = path.find('.');
-          if (dot != std::string::npos)
-            mention(path.substr(dot + 1), reader.scalar(*leaf, path), leaf->source().begin.line);
+          if (dot != std::string::npos) mention_node("--define " + name, path.substr(dot + 1), *leaf);
         }
       }
     } else if (option->kind == Option::Kind::flag) {
@@ -174,6 +204,14 @@ void ConfigFile::apply(Arguments& arguments) {
     texts.insert(texts.end(), typed.begin(), typed.end());
     option->give(texts);
   }
+  // What the file does not give is complained of as the command line's.
+  mentions_.erase(std::remove_if(mentions_.begin(), mentions_.end(),
+                                 [&](const Mention& each) {
+                                   return std::any_of(entries_.begin(), entries_.end(), [&](const Entry& entry) {
+                                     return !entry.used && entry.what() == each.entry;
+                                   });
+                                 }),
+                  mentions_.end());
 }
 
 bool ConfigFile::gives(const std::string& what) const {
@@ -191,18 +229,36 @@ std::vector<std::string> ConfigFile::settings() const {
 
 void ConfigFile::add(const std::string& option, const std::string& key, const std::string& text, unsigned line) {
   entries_.push_back({option, key, text, line});
+  const std::string entry = entries_.back().what();
   // A definition is complained of as the --variant that it is.
-  const std::string what = option == "--define" ? "--variant " + key : entries_.back().what();
-  for (const char* end : {")", "=", " ", ","}) mentions_.push_back({"(" + what + end, line});
+  const std::string what = option == "--define" ? "--variant " + key : entry;
+  for (const char* end : {")", "=", " ", ","}) mentions_.push_back({entry, "(" + what + end, line, {}});
 }
 
-void ConfigFile::mention(const std::string& key, const std::string& value, unsigned line) {
-  mentions_.push_back({"(" + key + ")", line});
-  mentions_.push_back({fmt::format("'{}' (slot {})", value, key), line});
+void ConfigFile::mention(const std::string& entry, const std::string& key, const std::string& value,
+                         const std::string& as_written, unsigned line) {
+  for (const char* end : {")", ","}) mentions_.push_back({entry, "(" + key + end, line, {}});
+  mentions_.push_back({entry, fmt::format("'{}' (slot {})", value, key), line, {}});
+  mentions_.push_back({entry, fmt::format("'{}' ({}", value, key), line, fmt::format("'{}' (", as_written)});
   const std::size_t dot = key.rfind('.');
   if (dot != std::string::npos)
-    mentions_.push_back({fmt::format("'{}' (unit {})", key.substr(dot + 1), key.substr(0, dot)), line});
+    mentions_.push_back({entry, fmt::format("'{}' (unit {}", key.substr(dot + 1), key.substr(0, dot)), line, {}});
 }
+
+void ConfigFile::check_overridden(const Arguments& arguments) const {
+  for (const Entry& entry : entries_) {
+    const Option& option = *arguments.find(entry.option);
+    if (entry.used || !option.check) continue;
+    try {
+      option.check(entry.text);
+    } catch (const UserError& error) {
+      std::string message = error.what();
+      throw CommandFailure(exit_user_error, message.insert(message.find(" (") + 2, place(entry.line) + ", "));
+    }
+  }
+}
+
+std::string ConfigFile::place(unsigned line) const { return fmt::format("{}:{}", path_.string(), line); }
 
 std::string ConfigFile::located(std::string message) const {
   // The longest says the most.
@@ -212,8 +268,9 @@ std::string ConfigFile::located(std::string message) const {
     if (best == nullptr || each.text.size() > best->text.size()) best = &each;
   }
   if (best == nullptr) return message;
-  const std::size_t place = message.find(best->text) + best->text.find('(') + 1;
-  return message.insert(place, fmt::format("{}:{}, ", path_.string(), best->line));
+  const std::size_t start = message.find(best->text), size = best->text.find('(') + 1;
+  const std::string before = best->as_written.empty() ? best->text.substr(0, size) : best->as_written;
+  return message.replace(start, size, before + place(best->line) + ", ");
 }
 
 void note_config(const Invocation& invocation, Provenance& provenance) {

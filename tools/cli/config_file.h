@@ -27,6 +27,9 @@ class ConfigFile {
   bool gives(const std::string& what) const;
   /// UNIT.PARAMETER of every setting from here.
   std::vector<std::string> settings() const;
+  /// Throws CommandFailure with file and line for a value that the command line takes the place of, and that could not be.
+  /// Plugins are loaded by then.
+  void check_overridden(const Arguments& arguments) const;
   /// A message with file and line before the option that it is about, if that is from here.
   std::string located(std::string message) const;
 
@@ -41,14 +44,18 @@ class ConfigFile {
   };
   /// A line, and how a message about what it says calls it.
   struct Mention {
+    std::string entry;  ///< Entry::what(), of which it is; empty for what somebody else reads
     std::string text;
     unsigned line = 0;
+    std::string as_written;  ///< what stands in place of its beginning, to the parenthesis; empty: nothing
   };
   void add(const std::string& option, const std::string& key, const std::string& text, unsigned line);
   /// Of UNIT.PARAMETER or SLOT, wherever it stands.
-  void mention(const std::string& key, const std::string& value, unsigned line);
+  void mention(const std::string& entry, const std::string& key, const std::string& value,
+               const std::string& as_written, unsigned line);
   void read(Arguments& arguments, const std::vector<std::string>& others);
   void apply(Arguments& arguments);
+  std::string place(unsigned line) const;
 
   std::filesystem::path path_;
   std::vector<Entry> entries_;
@@ -62,6 +69,9 @@ struct Invocation {
   std::optional<ConfigFile> config;
 
   bool gives(const std::string& what) const { return config && config->gives(what); }
+  void check_overridden() const {
+    if (config) config->check_overridden(*arguments);
+  }
 };
 
 /// What an option is given, with another name for the file if its value names one (help calls it FILE or DIR).

@@ -44,7 +44,8 @@ class DiffCommand : public Command {
       check_output_file(*place, "--json");
       check_files_differ({{"A.json", a_}, {"B.json", b_}}, {{"--json", *place}});
     }
-    const ResultDiff diff = diff_results(read_result(a_), read_result(b_));
+    const ResultFile a = read_result(a_), b = read_result(b_);
+    const ResultDiff diff = diff_results(a, b);
     if (place == "-") {
       std::cout << json_text(diff_json(diff));
       return;

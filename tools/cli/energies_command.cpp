@@ -30,17 +30,14 @@ std::string how_many(const ConstantPower& power) {
 
 std::string energies_as_text(const EnergyTable& table, const TextStyle& style) {
   constexpr std::size_t width = 120;
-  std::vector<std::string> heading{"unit: event"};
+  std::vector<std::string> heading{"unit: event, and how often"};
   for (const GpuProcess& process : table.processes) heading.push_back("pJ at " + printable(process.name));
-  heading.emplace_back("how often");
   TextTable events(heading);
-  events.left(heading.size() - 1);
-  events.wrap(width);
   for (const EnergyEvent& event : table.events) {
     std::vector<std::string> row{printable(event.unit + ": " + event.name)};
     for (const Range& each : event.picojoules) row.push_back(range_text(each));
-    row.push_back(printable(event.count.text));
     events.row(std::move(row));
+    events.below(printable(event.count.text), width);
   }
   TextTable powers({"constant power", "W", "how many"});
   powers.left(2);

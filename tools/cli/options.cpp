@@ -11,6 +11,7 @@
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/software.h>
 #include <vrpipe/workloads/gaussian_file.h>
+#include <vrpipe/workloads/multi_pass.h>
 #include <vrpipe/workloads/scene_substitution.h>
 
 #include "cli/parse.h"
@@ -27,8 +28,6 @@ namespace {
 constexpr const char* energies_option = "--energies";
 constexpr const char* html_option = "--html";
 
-/// Each but the last is two draws.
-constexpr unsigned most_passes = most_draws / 2 + 1;
 constexpr unsigned usual_passes = 4;  // of the path that has several
 
 const std::string variant_default = "het+qm";
@@ -40,6 +39,51 @@ std::string names_of(const std::vector<Fidelity>& fidelities) {
     text += vrpipe::name_of(fidelity);
   }
   return text;
+}
+
+/// None for all of a file.
+std::optional<std::size_t> view_count(const std::string& text) {
+  if (text == "all") return std::nullopt;
+  try {
+    return parse_count(text, ViewsChoice::option, most_views);
+  } catch (const UserError&) {
+    throw UserError("bad value '" + text + "'", ViewsChoice::option,
+                    fmt::format("it is neither `all` nor a whole number from 1 to {}", most_views),
+                    "give e.g. 20, or all");
+  }
+}
+
+unsigned passes_of(const std::string& text) { return parse_count(text, "--multi-pass", most_passes); }
+unsigned draws_of(const std::string& text) { return parse_count(text, "--draws", most_draws); }
+
+/// Throws UserError where a setting's unit is known and cannot have it, whatever the platform and the variant.
+void check_setting(const std::string& text) {
+  const Setting setting = parse_settings({text}).front();
+  const std::vector<ParameterListing> listings = all_parameters(nullptr);
+  const ParameterListing* of_unit = nullptr;
+  for (const ParameterListing& each : listings) {
+    if (each.unit != without_gpc(setting.unit)) continue;
+    const auto& declared = each.parameters->parameters();
+    const bool has_it = std::any_of(declared.begin(), declared.end(),
+                                    [&](const Parameter* parameter) { return parameter->name() == setting.parameter; });
+    if (of_unit == nullptr || has_it) of_unit = &each;
+    if (has_it) break;
+  }
+  if (of_unit != nullptr) of_unit->parameters->set(setting.unit, setting.parameter, setting.value);
+}
+
+/// Of one that is defined where it is chosen what can be said without the others.
+void check_variant(const std::string& text) {
+  if (text.find('=') != std::string::npos) {
+    parse_variant(text);
+  } else {
+    variant_named(text);
+  }
+}
+
+void check_unit(const std::string& text) {
+  const UnitChoice choice = parse_unit_choices({text}).front();
+  Registry::instance().find(without_gpc(choice.slot), choice.implementation);
 }
 
 /// Whether it draws with kernels, or by an accelerator.
@@ -61,6 +105,20 @@ void refuse_unused(const RunRequest& request, const std::vector<Variant>& varian
     check("--unit " + choice.slot + "=" + choice.implementation, choice.slot);
 }
 
+/// A unit for all that no variant takes.
+void refuse_overridden(const std::vector<UnitChoice>& units, const std::vector<Variant>& variants) {
+  for (const UnitChoice& choice : units) {
+    const UnitChoice* own = nullptr;
+    const auto has_own = [&](const Variant& variant) { return (own = own_unit(variant, choice)) != nullptr; };
+    if (!std::all_of(variants.begin(), variants.end(), has_own)) continue;
+    throw UserError("cannot choose a unit for '" + choice.slot + "'",
+                    "--unit " + choice.slot + "=" + choice.implementation,
+                    fmt::format("variant {} has a unit of its own in slot {}, {}", variants.back().name, own->slot,
+                                own->implementation),
+                    "leave it out, or take another variant");
+  }
+}
+
 /// Whether a setting is from a configuration file.
 std::function<bool(const Setting&)> of_file(const Invocation& invocation) {
   return [&invocation](const Setting& setting) {
@@ -80,6 +138,7 @@ void declare_jobs(Arguments& arguments, Values& jobs) {
                        "simulations at a time, each a process of its own (default: one for each\n"
                        "processor; results do not depend on it)",
                        result_group);
+  arguments.find("--jobs")->check = [](const std::string& text) { processes({text}); };
 }
 
 unsigned processes(const Values& jobs) {
@@ -119,6 +178,7 @@ void SimulationArguments::declare_scene(Arguments& arguments) {
                        "(default: #0; docs/cameras.md)",
                        scene_group);
   declare_undistorted(arguments, undistorted_);
+  arguments.find("--size")->check = [](const std::string& text) { parse_size(text, "--size"); };
   arguments.add_option("--eye", eye_, "X,Y,Z",
                        "where the camera stands, world units (default: chosen to fit the scene)", scene_group);
   arguments.add_option("--look-at", look_at_, "X,Y,Z", "the point in the middle of the image, world units",
@@ -133,6 +193,14 @@ void SimulationArguments::declare_scene(Arguments& arguments) {
                        "in place of --fovy: without perspective, and how many world units the image's\n"
                        "height spans",
                        scene_group);
+  for (const char* option : {"--eye", "--look-at", "--up"}) {
+    arguments.find(option)->check = [option](const std::string& text) {
+      parse_triple(text, option, "X,Y,Z", "0,-1,0");
+    };
+  }
+  for (const char* option : {"--fovy", "--orthographic"}) {
+    arguments.find(option)->check = [option](const std::string& text) { parse_number(text, option); };
+  }
   arguments.add_flag("--no-scene-cache", no_scene_cache_,
                      "makes a built-in scene anew, instead of reading what the same build has made\n"
                      "before from the user's cache folder",
@@ -143,11 +211,13 @@ void SimulationArguments::declare_variant(Arguments& arguments) {
   arguments
       .add_option("--variant", variant_, "NAME|NAME=BASE,...",
                   "baseline, qm (quad merging), het (hardware early termination), het+qm,\n"
-                  "software or accelerator (docs/software.md), or one of your own, as in\n"
-                  "mine=het+qm,qru=same-splat,tc.bins=64 (default: " +
+                  "in-shader or in-shader-no-lock (shaders blend), software or accelerator\n"
+                  "(docs/software.md), or one of your own, as in\n"
+                  "mine=het+qm,tgc=pass-through,tc.bins=64\n(default: " +
                       variant_default + "; docs/configuration.md)",
                   machine_group)
       .default_text = variant_default;
+  arguments.find("--variant")->check = check_variant;
 }
 
 void SimulationArguments::declare_rules(Arguments& arguments) {
@@ -164,12 +234,15 @@ void SimulationArguments::declare_rules(Arguments& arguments) {
       .add_option("--format", format_, "NAME",
                   "colour target: rgba8, srgb8, rgba16f, rgba16 (UNORM) or rgba32f\n(default: rgba16f)", rules_group)
       .default_text = "rgba16f";
+  arguments.find("--format")->check = [](const std::string& text) { color_format_named(text); };
   arguments
       .add_option("--termination", termination_, "NAME",
                   "when a termination bit counts: paper (once its update has travelled) or\n"
                   "strict (order alone decides) (default: paper)",
                   rules_group)
       .default_text = "paper";
+  arguments.find("--termination")->check = [](const std::string& text) { termination_named(text); };
+  arguments.find("--effects")->check = [](const std::string& text) { EffectChoice::parse(text); };
 }
 
 void SimulationArguments::declare_study(Arguments& arguments) {
@@ -200,10 +273,13 @@ void SimulationArguments::declare(Arguments& arguments, Variants variants) {
 
 void SimulationArguments::declare_variants(Arguments& arguments) {
   arguments.add_option("--variant", variant_, "NAME|NAME=BASE,...",
-                       "what is compared: baseline, qm, het, het+qm, software, accelerator, or one of\n"
-                       "your own, as in mine=het+qm,qru=same-splat,tc.bins=64; can be repeated (default:\n"
-                       "the first four, and those of plugins and of --config; docs/configuration.md)",
+                       "what is compared: baseline, qm, het, het+qm, in-shader, in-shader-no-lock,\n"
+                       "software, accelerator, or one of your own, as in\n"
+                       "mine=het+qm,tgc=pass-through,tc.bins=64; can be repeated\n"
+                       "(default: the first four, and those of plugins and of --config;\n"
+                       "docs/configuration.md)",
                        machine_group);
+  arguments.find("--variant")->check = check_variant;
 }
 
 void SimulationArguments::declare_comparison(Arguments& arguments) {
@@ -235,6 +311,7 @@ void SimulationArguments::declare_images(Arguments& arguments) {
   arguments
       .add_option("--background", background_, "R,G,B", "behind the PNG, each 0 to 1 (default: 0,0,0)", result_group)
       .default_text = "0,0,0";
+  arguments.find("--background")->check = [](const std::string& text) { parse_background(text, "--background"); };
 }
 
 void SimulationArguments::declare_whole_frames(Arguments& arguments) {
@@ -245,12 +322,15 @@ void SimulationArguments::declare_whole_frames(Arguments& arguments) {
   declare_platform(arguments);
   declare_changes(arguments);
   declare_rules(arguments);
-  arguments.add_option("--multi-pass", passes_, "N", "passes of the path multi-pass (default: 4; 1: without it)",
-                       scene_group);
+  arguments
+      .add_option("--multi-pass", passes_, "N", "passes of the path multi-pass (default: 4; 1: without it)",
+                  scene_group)
+      .check = [](const std::string& text) { passes_of(text); };
   arguments.add_option(ViewsChoice::option, views_, "N|all",
                        "the scene from N cameras evenly spaced among those of --camera FILE, or from\n"
                        "all of them; without a file, from N round the scene: how frames are distributed",
                        scene_group);
+  arguments.find(ViewsChoice::option)->check = [](const std::string& text) { view_count(text); };
   arguments.add_flag("--imitation", imitation_,
                      "one more path: the baseline as the paper measured energy with it, termination imitated\n"
                      "by a stencil that counts, merging by the shader (docs/energy.md)",
@@ -276,6 +356,7 @@ void SimulationArguments::declare_platform(Arguments& arguments) {
       .add_option("--platform", platform_, "NAME",
                   "the GPU (default: " + platforms().front().name + "; `vrpipe platforms` lists them)", machine_group)
       .default_text = platforms().front().name;
+  arguments.find("--platform")->check = [](const std::string& text) { platform_named(text); };
 }
 
 void SimulationArguments::declare_changes(Arguments& arguments) {
@@ -283,6 +364,7 @@ void SimulationArguments::declare_changes(Arguments& arguments) {
                        "changes a parameter, e.g. tc.bins=64, or crop.cache_bytes=32K; can be\n"
                        "repeated (`vrpipe units` lists all, with units, ranges and defaults)",
                        machine_group);
+  arguments.find("--set")->check = check_setting;
   declare_units(arguments, units_, plugins_);
 }
 
@@ -307,6 +389,7 @@ void declare_units(Arguments& arguments, Values& units, Values& plugins) {
                        "puts another unit into a slot, in every variant where the slot is not\n"
                        "pass-through; can be repeated",
                        machine_group);
+  arguments.find("--unit")->check = check_unit;
   arguments.add_option("--plugin", plugins, "FILE.so", "loads units from a plugin, for --unit; can be repeated",
                        machine_group);
 }
@@ -321,6 +404,10 @@ void SimulationArguments::declare_fidelity(Arguments& arguments) {
                       "lt,UNIT=cycle,... has some units in every cycle among others at lt",
                   rules_group)
       .default_text = vrpipe::name_of(Fidelity::cycle);
+  arguments.find("--fidelity")->check = [](const std::string& text) {
+    RunRequest request;
+    choose_fidelity(request, text);
+  };
 }
 
 void SimulationArguments::declare_page(Arguments& arguments) {
@@ -341,6 +428,8 @@ void SimulationArguments::declare_frames(Arguments& arguments) {
                        "last a draw that sets the stencil where a pixel has terminated (default: 1;\n"
                        "docs/early-termination.md)",
                        scene_group);
+  arguments.find("--multi-pass")->check = [](const std::string& text) { passes_of(text); };
+  arguments.find("--draws")->check = [](const std::string& text) { draws_of(text); };
 }
 
 void SimulationArguments::declare_views(Arguments& arguments) {
@@ -350,6 +439,7 @@ void SimulationArguments::declare_views(Arguments& arguments) {
                        "and early-termination ratios are distributed. Goes on where it was\n"
                        "interrupted (docs/cameras.md)",
                        scene_group);
+  arguments.find(ViewsChoice::option)->check = [](const std::string& text) { view_count(text); };
   arguments.add_option(ViewsChoice::journal_option, journal_, "FILE",
                        "where --views stores what is done, and goes on from; it stays (default: a\n"
                        "file in the user's cache folder, removed at the end)",
@@ -382,20 +472,11 @@ std::optional<ViewsChoice> SimulationArguments::views() const {
   const auto camera = single(camera_, "--camera");
   refuse(camera && camera_choice(*camera).camera, "--camera", "what follows # names one camera");
   ViewsChoice choice;
-  if (*text == "all") {
-    if (!camera) {
-      throw UserError("bad value 'all'", ViewsChoice::option,
-                      "without --camera FILE the cameras go round the scene, and there is no end of them",
-                      "give a number, or a camera file");
-    }
-  } else {
-    try {
-      choice.count = parse_count(*text, ViewsChoice::option, most_views);
-    } catch (const UserError&) {
-      throw UserError("bad value '" + *text + "'", ViewsChoice::option,
-                      fmt::format("it is neither `all` nor a whole number from 1 to {}", most_views),
-                      "give e.g. 20, or all");
-    }
+  choice.count = view_count(*text);
+  if (!choice.count && !camera) {
+    throw UserError("bad value 'all'", ViewsChoice::option,
+                    "without --camera FILE the cameras go round the scene, and there is no end of them",
+                    "give a number, or a camera file");
   }
   if (journal) choice.journal = *journal;
   return choice;
@@ -450,8 +531,7 @@ FrameDescription SimulationArguments::frame() const {
   if (!file) {
     FrameDescription frame = frame_of_scene(single(scene_, "--scene").value_or(""));
     if (takes_kernels_) frame.passes = usual_passes;
-    if (const auto text = single(passes_, "--multi-pass"))
-      frame.passes = parse_count(*text, "--multi-pass", most_passes);
+    if (const auto text = single(passes_, "--multi-pass")) frame.passes = passes_of(*text);
     if (!draws_.empty())
       throw UserError("cannot use option", "--draws", "a scene is one draw", "leave it out, or draw a --frame FILE");
     return frame;
@@ -464,8 +544,7 @@ FrameDescription SimulationArguments::frame() const {
   refuse_with_frame(passes_, "--multi-pass", "it splits the one draw of a scene, and --frame says what is drawn");
   refuse_with_frame(save_draw_, "--save-draw", "a draw list has one draw, and a frame may have several");
   FrameDescription frame = read_frame_file(*file);
-  if (const auto text = single(draws_, "--draws"))
-    leave_out_draws_after(parse_count(*text, "--draws", most_draws), frame);
+  if (const auto text = single(draws_, "--draws")) leave_out_draws_after(draws_of(*text), frame);
   return frame;
 }
 
@@ -540,7 +619,14 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
                                            const std::vector<std::string>& of_study) const {
   // Plugins first: they may bring the platform and the units that the other options name.
   load_plugins(plugins_);
-  for (const std::string& text : definitions_) add_user_variant(parse_variant(text));
+  std::vector<VariantDefinition> definitions;
+  for (const Values& texts : {definitions_, variant_}) {
+    for (const std::string& text : texts) {
+      if (text.find('=') != std::string::npos) definitions.push_back(parse_variant(text));
+    }
+  }
+  add_user_variants(std::move(definitions));
+  invocation.check_overridden();
 
   SimulationJob job;
   job.schema = !views_.empty() ? "vrpipe.views/1" : variants == Variants::one ? "vrpipe.run/1" : "vrpipe.compare/1";
@@ -576,7 +662,9 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
   job.preprocess_parameters = std::move(parts.preprocess_parameters);
 
   job.requests = requests(request, variants);
-  check_outside(job, variants_drawn_by(job, of_study));
+  const std::vector<Variant> drawn = variants_drawn_by(job, of_study);
+  check_outside(job, drawn);
+  refuse_overridden(job.requests.front().units, drawn);
   leave_out_restated(job.requests, of_file(invocation));
   for (RunRequest& each : job.requests) {
     const StdoutToStderr redirected;
@@ -605,6 +693,7 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
 
 MachineJob SimulationArguments::resolve_machine(const Invocation& invocation, const Platform* platform) const {
   load_plugins(plugins_);
+  invocation.check_overridden();
   MachineJob job;
   job.provenance = make_provenance(invocation.words, plugins_);
   note_config(invocation, job.provenance);
@@ -657,7 +746,7 @@ std::vector<Variant> SimulationArguments::chosen_variants(Variants variants) con
   std::vector<Variant> chosen;
   for (const std::string& text : variant_) {
     const bool is_new = text.find('=') != std::string::npos;
-    chosen.push_back(is_new ? add_user_variant(parse_variant(text)) : variant_named(text));
+    chosen.push_back(variant_named(is_new ? parse_variant(text).name : text));
   }
   if (chosen.empty() && variants == Variants::one) return {variant_named(variant_default)};
   return chosen.empty() ? vrpipe::variants() : chosen;

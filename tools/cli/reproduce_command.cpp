@@ -86,6 +86,10 @@ class ReproduceCommand : public Command {
                          "of the main comparison: lt or cycle (default: cycle, with --quick lt); the\n"
                          "sensitivity is always at lt",
                          machine_group);
+    arguments.find("--size")->check = [](const std::string& text) { parse_size(text, "--size"); };
+    arguments.find("--views")->check = [](const std::string& text) { parse_count(text, "--views", most_views); };
+    arguments.find("--platform")->check = [](const std::string& text) { platform_named(text); };
+    arguments.find("--fidelity")->check = [](const std::string& text) { fidelity_named(text); };
     arguments.add_option("--output", output_, "DIR",
                          "writes the heat maps of fragments as PNG there; created if missing", result_group);
     declare_result_json(arguments, json_);
@@ -140,6 +144,7 @@ class ReproduceCommand : public Command {
  private:
   ReproduceJob resolve() const {
     load_plugins(plugins_);
+    invocation().check_overridden();
     ReproduceJob job;
     job.provenance = make_provenance(invocation().words, plugins_);
     for (const std::string& plugin : plugins_) job.inputs.push_back({"--plugin", plugin});

@@ -83,6 +83,11 @@ void TimeArguments::declare(Arguments& arguments, const std::string& group, bool
                          "cycle",
                          group);
   }
+  for (const char* option : {interval_option, until_option}) {
+    if (Option* const count = arguments.find(option)) {
+      count->check = [option](const std::string& text) { parse_count(text, option, longest_interval); };
+    }
+  }
   arguments.add_flag(HeatMaps::option, heat_maps_,
                      "with --output: writes maps of the fragments of each pixel and screen tile,\n"
                      "SCENE-VARIANT-pixels-*.png and .exr, -tiles-*.png and .exr",

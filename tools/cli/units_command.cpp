@@ -252,7 +252,7 @@ class UnitsCommand : public Command {
     for (const Effect* effect : effects) slots.push_back(effect->component);
     if (std::find(slots.begin(), slots.end(), slot) == slots.end()) {
       throw UserError("unknown slot '" + slot + "'", "--slot", "there is no such slot",
-                      "did you mean " + nearest_name(slot, slots) + "? `vrpipe units` lists all");
+                      suggestion(slot, slots, "`vrpipe units` lists all"));
     }
     const auto is_other = [&](const ParameterListing& unit) { return unit.unit != slot; };
     units.erase(std::remove_if(units.begin(), units.end(), is_other), units.end());

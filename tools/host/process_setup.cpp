@@ -65,18 +65,21 @@ void set_up_process() {
   }
 }
 
-void note_written(const std::string& path) {
+void note_written(const std::string& path, bool goes_on) {
   static std::mutex mutex;
   static std::vector<std::string> files;
+  static bool has_journal = false;
   static auto& texts = *new std::deque<std::string>;
   const std::lock_guard<std::mutex> lock(mutex);
   files.push_back(printable(path));
+  has_journal = has_journal || goes_on;
   constexpr std::size_t most = 4;
   const std::size_t named = std::min(files.size(), most);
   std::string list =
       fmt::format("{}", fmt::join(files.begin(), files.begin() + static_cast<std::ptrdiff_t>(named), ", "));
   if (files.size() > most) list += fmt::format(" and {} more", files.size() - most);
-  texts.push_back("vrpipe: interrupted; written: " + list + "\n");
+  texts.push_back("vrpipe: interrupted; written: " + list +
+                  (has_journal ? "; the same command goes on from there\n" : "\n"));
   last_words = texts.back().c_str();
 }
 

@@ -13,8 +13,8 @@ namespace vrpipe::tools {
 /// A file that outgrows its limit is an error of writing, not the end by SIGXFSZ.
 void set_up_process();
 
-/// For that line: a file that is complete.
-void note_written(const std::string& path);
+/// For that line: a file that is complete, or, if the same command `goes_on` from it, a journal.
+void note_written(const std::string& path, bool goes_on = false);
 
 /// For that line: whether a progress line stands on the terminal.
 void note_progress_line(bool is_drawn);

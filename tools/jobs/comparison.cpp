@@ -59,7 +59,7 @@ std::size_t place_of_run(const std::vector<RunRequest>& requests, const std::str
     names.push_back(name_of(request));
   }
   throw UserError("unknown run '" + name + "'", option, "it is none of those that are compared",
-                  fmt::format("did you mean {}? There are {}", nearest_name(name, names), fmt::join(names, ", ")));
+                  suggestion(name, names));
 }
 
 }  // namespace vrpipe::tools

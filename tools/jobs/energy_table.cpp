@@ -203,8 +203,7 @@ class TableReader : TomlReader {
     const auto found = std::find(names.begin(), names.end(), read.node);
     if (found == names.end()) {
       refuse(*table.get("node"), fmt::format("there is no node '{}'", read.node),
-             names.empty() ? std::string("write a [[node]] of that name")
-                           : fmt::format("did you mean {}?", nearest_name(read.node, names)));
+             names.empty() ? std::string("write a [[node]] of that name") : suggestion(read.node, names));
     }
     read.published = range(table, "pj");
     for (const GpuProcess& process : processes) {
@@ -294,7 +293,7 @@ void check_energy_names(const EnergyTable& table, const Platform& platform) {
         throw UserError(cannot_use_table, formula.where,
                         others.count(name) > 0 ? "'" + name + "' is neither a counter nor a number"
                                                : "nothing counts '" + name + "'",
-                        "did you mean " + nearest_name(name, countable) + "? `vrpipe units` lists all");
+                        suggestion(name, {countable.begin(), countable.end()}, "`vrpipe units` lists all"));
       }
     }
   };

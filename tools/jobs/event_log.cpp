@@ -27,7 +27,7 @@ namespace {
   throw UserError("cannot log '" + unit + "'", EventLog::option,
                   is_memory ? "a memory has no states and no links" : "the platform has no such unit",
                   is_memory ? "log the units that ask it, such as crop"
-                            : "did you mean " + nearest_name(unit, names) + "?");
+                            : suggestion(unit, names, "`vrpipe units` lists all"));
 }
 
 }  // namespace
@@ -58,6 +58,7 @@ void EventLog::attach(const RunRequest& request, Observers& observers) {
     }
     if (!found) refuse_log(choice.unit, netlist);
   }
+  observers.on_end([this](const RunResult& result) { check_windows(result.cycles.value_or(0)); });
   observers.on_states([this](const std::string& unit, UnitState state, Cycle from) {
     const Logged* const of_unit = logged(unit);
     if (of_unit != nullptr && of_unit->wants(from)) write(from, unit, std::string("state ") + vrpipe::name_of(state));
@@ -75,6 +76,14 @@ void EventLog::attach(const RunRequest& request, Observers& observers) {
       if (is_sent) write(passed.first, sender->unit, "out " + text);
       if (is_received) write(passed.first, receiver->unit, "in " + text);
     });
+  }
+}
+
+void EventLog::check_windows(Cycle cycles) const {
+  for (const Choice& choice : choices_) {
+    if (cycles > choice.window.from) continue;
+    throw UserError("nothing to log", fmt::format("{} {}@{}:", option, choice.unit, choice.window.from),
+                    fmt::format("the run ends after {} cycles", cycles), "begin earlier");
   }
 }
 

@@ -42,6 +42,8 @@ class EventLog {
     bool wants(Cycle cycle) const;
   };
   Logged* logged(const std::string& unit);
+  /// Throws UserError for one that begins after the end of the run.
+  void check_windows(Cycle cycles) const;
   void write(Cycle cycle, const std::string& unit, const std::string& what);
   void open();
 

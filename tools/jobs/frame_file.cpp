@@ -32,9 +32,7 @@ constexpr const char* command_remedy = "give {\"draw\": SCENE} or {\"clear\": [.
 /// For a name that is none of those known.
 [[noreturn]] void refuse_unknown(const std::string& where, const std::string& kind, const std::string& name,
                                  const std::vector<std::string>& known) {
-  const std::string all = known.size() > 1 ? fmt::format(" there are {}", fmt::join(known, ", ")) : "";
-  refuse_frame(where, fmt::format("unknown {} '{}'", kind, name),
-               fmt::format("did you mean {}?{}", nearest_name(name, known), all));
+  refuse_frame(where, fmt::format("unknown {} '{}'", kind, name), suggestion(name, known));
 }
 
 void check_keys(const FrameJson& object, const std::vector<std::string>& known, const std::string& where) {

@@ -13,7 +13,8 @@
 namespace vrpipe::tools {
 namespace {
 
-constexpr const char* fate_names[fragment_fates] = {"rasterized", "terminated", "merged", "blended"};
+constexpr const char* merged_name = "merged";
+constexpr const char* fate_names[fragment_fates] = {"rasterized", "terminated", merged_name, "blended"};
 constexpr const char* cycle_name = "termination_cycle";
 
 bool has_time(Fidelity fidelity) { return fidelity != Fidelity::functional && fidelity != Fidelity::bound; }
@@ -80,8 +81,11 @@ nlohmann::ordered_json legend(const std::vector<NamedChannel>& channels) {
 
 }  // namespace
 
-HeatMaps::HeatMaps(std::uint32_t width, std::uint32_t height, Fidelity fidelity)
-    : has_time_(has_time(fidelity)), fates_(width, height), cycles_(width, height) {}
+HeatMaps::HeatMaps(std::uint32_t width, std::uint32_t height, const RunRequest& request)
+    : has_time_(has_time(request.fidelity)),
+      is_of_pipeline_(request.variant.is_of_pipeline()),
+      fates_(width, height),
+      cycles_(width, height) {}
 
 void HeatMaps::attach(Observers& observers, bool terminates) {
   observers.on_fragments([this](const Observers::Fragments& seen) {
@@ -151,7 +155,11 @@ std::vector<std::filesystem::path> HeatMaps::files(const std::string& stem, Fide
 
 void HeatMaps::write(const std::string& stem, ResultFiles& files) const {
   const std::uint32_t width = fates_.width(), height = fates_.height();
-  const std::vector<NamedChannel> pixels = of_pixels();
+  std::vector<NamedChannel> pixels = of_pixels();
+  const auto is_missing = [&](const NamedChannel& channel) {
+    return !is_of_pipeline_ && (channel.name == merged_name || channel.name == cycle_name);
+  };
+  pixels.erase(std::remove_if(pixels.begin(), pixels.end(), is_missing), pixels.end());
   const std::vector<NamedChannel> tiles = of_tiles(pixels);
   const nlohmann::ordered_json legends{{pixels_name, legend(pixels)}, {tiles_name, legend(tiles)}};
   files.write(legend_name(stem), legends.dump(2) + "\n", option);

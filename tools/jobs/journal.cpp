@@ -180,7 +180,7 @@ void Journal::open(const nlohmann::json& head) {
                       : std::string("it is no journal of this command"),
            "name another file, or remove it");
   }
-  note_written(path_.string());
+  note_written(path_.string(), true);
 }
 
 /// What follows the first line; a last line without end is taken off the file. Throws UserError.

@@ -124,8 +124,9 @@ const tools::MicrobenchDefinition& definition_named(const std::string& name) {
   std::vector<std::string> known = papers;
   known.insert(known.end(), laws.begin(), laws.end());
   throw UserError("unknown microbenchmark '" + name + "'", "vrpipe microbench", "there is no such one",
-                  fmt::format("did you mean {}? There are {}, and all; {}, and laws", nearest_name(name, known),
-                              fmt::join(papers, ", "), fmt::join(laws, ", ")));
+                  suggestion(name, known,
+                             fmt::format("there are {}, and all; {}, and laws", fmt::join(papers, ", "),
+                                         fmt::join(laws, ", "))));
 }
 
 }  // namespace

@@ -88,14 +88,14 @@ class RowReader : TomlReader {
   std::string measure_name(const toml::node& node) const {
     std::string text = text_of(node, "measure");
     if (is_measure(text)) return text;
-    refuse(node, "nothing measures '" + text + "'", "did you mean " + nearest_name(text, measure_names()) + "?");
+    refuse(node, "nothing measures '" + text + "'", suggestion(text, measure_names()));
   }
   std::string quantity_name(const toml::node& node) const {
     std::string text = text_of(node, "a quantity");
     if (find_quantity(text) != nullptr) return text;
     std::vector<std::string> names;
     for (const Quantity& each : quantities()) names.push_back(each.name);
-    refuse(node, "there is no quantity '" + text + "'", "did you mean " + nearest_name(text, names) + "?");
+    refuse(node, "there is no quantity '" + text + "'", suggestion(text, names));
   }
 
   PaperRow row(const toml::table& table) const {

@@ -20,7 +20,7 @@ const std::string of_scene = preprocess_unit + ".opacity_compensation";
 bool means_preprocess(const std::string& unit) {
   const std::vector<ParameterListing> listings = list_parameters(nullptr);
   const auto is_named = [&](const ParameterListing& listing) { return listing.unit == unit; };
-  return unit != preprocess_unit && edit_distance(unit, preprocess_unit) <= 3 &&
+  return unit != preprocess_unit && !near_name(unit, {preprocess_unit}).empty() &&
          std::none_of(listings.begin(), listings.end(), is_named);
 }
 
@@ -113,7 +113,7 @@ SettingsByPart sort_settings(const std::vector<Setting>& settings) {
   for (const Setting& setting : settings) {
     if (means_preprocess(setting.unit)) {
       throw UserError("unknown unit '" + setting.unit + "'", "--set " + setting.unit + "." + setting.parameter,
-                      "no such unit", "did you mean " + preprocess_unit + "? `vrpipe units` lists all");
+                      "no such unit", suggestion(setting.unit, {preprocess_unit}, "`vrpipe units` lists all"));
     }
     if (setting.unit == preprocess_unit) {
       preprocess.set(setting.parameter, setting.value);

@@ -33,7 +33,7 @@ class StudyReader : public TomlFile {
     if (dot != std::string::npos && dot > 0 && dot + 1 < name.size()) return;
     refuse(node, "unknown axis '" + name + "'",
            "it is neither of " + fmt::format("{}", fmt::join(plain_axes, ", ")) + " nor UNIT.PARAMETER",
-           "did you mean " + nearest_name(name, plain_axes) + "?");
+           suggestion(name, plain_axes));
   }
 
   StudyAxis axis(const std::string& name, const toml::node& node) const {
@@ -63,8 +63,7 @@ class StudyReader : public TomlFile {
       const std::vector<std::string> known{"from", "to", "step", "factor"};
       const std::string text(key.str());
       if (std::find(known.begin(), known.end(), text) == known.end())
-        refuse(node, "unknown key '" + text + "'", "a range has from, to and step or factor",
-               "did you mean " + nearest_name(text, known) + "?");
+        refuse(node, "unknown key '" + text + "'", "a range has from, to and step or factor", suggestion(text, known));
       if (!node.is_number()) refuse(node, "bad value of '" + text + "'", "it is no number", "give a number");
     }
     const auto number = [&](const char* key) { return range[key].value<double>(); };
@@ -318,7 +317,7 @@ AxisValues parse_axis_values(const std::string& text, const Study& study, const 
     }
     if (found == nullptr)
       throw UserError("unknown axis '" + name + "'", where, "the study has no such axis",
-                      names.empty() ? "add it to the study" : "did you mean " + nearest_name(name, names) + "?");
+                      names.empty() ? "add it to the study" : suggestion(name, names));
     if (std::find(found->values.begin(), found->values.end(), value) == found->values.end())
       throw UserError("unknown value '" + value + "' of " + name, where, "the axis does not have it",
                       fmt::format("give one of {}", fmt::join(found->values, ", ")));

@@ -78,7 +78,7 @@ void check_pareto(const Study& study) {
   for (const std::string& name : study.pareto) {
     if (std::find(columns.begin(), columns.end(), is_plain(name)) == columns.end())
       throw UserError("unknown column '" + is_plain(name) + "'", "pareto", "results have no such column",
-                      "did you mean " + nearest_name(is_plain(name), columns) + "?");
+                      suggestion(is_plain(name), columns));
   }
 }
 

@@ -323,7 +323,7 @@ void check_columns(const SweepJob& job, const std::vector<RunRequest>& requests)
   for (const std::string& column : job.study.columns) {
     if (known.count(column) > 0) continue;
     throw UserError("unknown statistic '" + column + "'", "columns", "no point has one of that name",
-                    "did you mean " + nearest_name(column, known) + "? `vrpipe units` lists them");
+                    suggestion(column, {known.begin(), known.end()}, "`vrpipe units` lists them"));
   }
 }
 

@@ -37,9 +37,10 @@ TomlFile::TomlFile(const std::filesystem::path& path, const std::string& what, c
                    const std::string& page)
     : path_(path) {
   std::error_code ignored;
+  const bool is_folder = std::filesystem::is_directory(path_, ignored);
   std::ifstream file(path_, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path_, ignored)) {
-    throw UserError(what, where, "there is no such file, or it may not be read",
+  if (!file || is_folder) {
+    throw UserError(what, where, is_folder ? "it is a directory" : "there is no such file, or it may not be read",
                     "name a TOML file; " + page + " describes it");
   }
   const std::string content(std::istreambuf_iterator<char>(file), {});

@@ -38,8 +38,7 @@ void TomlReader::check_keys(const toml::table& table, const std::vector<std::str
   for (const auto& [key, value] : table) {
     const std::string name(key.str());
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
-    throw UserError(what_, line(key.source()), fmt::format("unknown key '{}'", name),
-                    fmt::format("did you mean {}? there are {}", nearest_name(name, known), fmt::join(known, ", ")));
+    throw UserError(what_, line(key.source()), fmt::format("unknown key '{}'", name), suggestion(name, known));
   }
 }
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr const char* variant_option = "--variant";
 constexpr const char* form = "NAME=BASE[,SLOT=IMPLEMENTATION][,UNIT.PARAMETER=VALUE]...";
-constexpr const char* example = "give e.g. --variant mine=het+qm,qru=same-splat,tc.bins=64";
+constexpr const char* example = "give e.g. --variant mine=het+qm,tgc=pass-through,tc.bins=64";
 
 /// Splits at the first `=`; both sides must be there.
 std::pair<std::string, std::string> pair_of(const std::string& part, const std::string& text) {
@@ -67,8 +67,7 @@ const Variant& add_user_variant(const VariantDefinition& definition) {
     std::vector<std::string> names;
     for (const Variant& each : known) names.push_back(each.name);
     throw UserError("unknown variant '" + definition.base + "'", where, "it is to be the base, and there is none",
-                    fmt::format("did you mean {}? There are {}", nearest_name(definition.base, names),
-                                fmt::join(names, ", ")));
+                    suggestion(definition.base, names));
   }
   Variant variant = variant_named(definition.base);
   variant.name = definition.name;
@@ -94,7 +93,7 @@ const Variant& add_user_variant(const VariantDefinition& definition) {
     if (dot == std::string::npos || dot == 0 || dot + 1 == key.size()) {
       const std::vector<std::string> slots = Registry::instance().slot_names();
       throw UserError("unknown slot '" + key + "'", where, "it is no slot, and no UNIT.PARAMETER",
-                      "did you mean " + nearest_name(key, slots) + "? `vrpipe units` lists all");
+                      suggestion(key, slots, "`vrpipe units` lists all"));
     }
     if (key.compare(0, dot, "preprocess") == 0) {
       throw UserError("cannot change '" + key + "'", where, "the scene is preprocessed once, for all variants",
@@ -107,6 +106,43 @@ const Variant& add_user_variant(const VariantDefinition& definition) {
   }
   add_variant(std::move(variant));
   return variant_named(definition.name);
+}
+
+void add_user_variants(std::vector<VariantDefinition> definitions) {
+  const auto based_on = [&](const VariantDefinition& definition) {
+    for (const std::vector<Variant>* const list : {&variants(), &more_variants()}) {
+      for (const Variant& known : *list) {
+        if (known.name == definition.base) return definitions.end();
+      }
+    }
+    return std::find_if(definitions.begin(), definitions.end(),
+                        [&](const VariantDefinition& other) { return other.name == definition.base; });
+  };
+  while (!definitions.empty()) {
+    auto next = definitions.begin();
+    std::vector<std::string> chain{next->name};
+    for (auto base = based_on(*next); base != definitions.end(); base = based_on(*next)) {
+      const bool is_circle = std::find(chain.begin(), chain.end(), base->name) != chain.end();
+      chain.push_back(base->name);
+      if (is_circle) {
+        throw UserError("cannot define variant '" + next->name + "'", std::string(variant_option) + " " + next->name,
+                        fmt::format("it is based on itself: {}", fmt::join(chain, " on ")),
+                        "base one of them on what there is, e.g. het+qm");
+      }
+      next = base;
+    }
+    const VariantDefinition definition = *next;
+    definitions.erase(next);
+    add_user_variant(definition);
+  }
+}
+
+const UnitChoice* own_unit(const Variant& variant, const UnitChoice& choice) {
+  for (const UnitChoice& own : variant.changed_units) {
+    const bool is_there = own.slot == choice.slot || own.slot == without_gpc(choice.slot);
+    if (is_there && own.implementation != choice.implementation) return &own;
+  }
+  return nullptr;
 }
 
 std::string changes_text(const Variant& variant) {

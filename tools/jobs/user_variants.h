@@ -26,7 +26,13 @@ std::string text_of(const VariantDefinition& definition);
 /// base, and a change of what all runs share; that units and parameters exist is checked with the platform.
 const Variant& add_user_variant(const VariantDefinition& definition);
 
-/// What it changes, as in "qru=same-splat, tc.bins=64".
+/// Adds them all, each after the one that it is based on. Throws UserError, also for one that is based on itself.
+void add_user_variants(std::vector<VariantDefinition> definitions);
+
+/// The unit that a variant has in the place of one that is chosen for all; null where it takes that one.
+const UnitChoice* own_unit(const Variant& variant, const UnitChoice& choice);
+
+/// What it changes, as in "tgc=pass-through, tc.bins=64".
 std::string changes_text(const Variant& variant);
 
 }  // namespace vrpipe::tools

@@ -50,7 +50,7 @@ std::string camera_text(const JobResult& result) {
                                       : ", looking at " + triple_text(camera["look_at"]);
   return text + (camera["fovy_degrees"].is_null()
                      ? fmt::format(", {} world units high, orthographic", camera["orthographic_height"].get<double>())
-                     : fmt::format(", {} degrees high", camera["fovy_degrees"].get<double>()));
+                     : fmt::format(", {:.12g} degrees high", camera["fovy_degrees"].get<double>()));
 }
 
 std::string scene_text(const JobResult& result) {

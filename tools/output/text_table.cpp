@@ -28,10 +28,17 @@ std::vector<std::string> wrapped(const std::string& text, std::size_t width) {
   return lines;
 }
 
-void TextTable::group(const std::string& title) { rows_.push_back({{title}, true, false}); }
+void TextTable::group(const std::string& title) { rows_.push_back({{title}, Row::Kind::group, false}); }
 
 void TextTable::row(std::vector<std::string> cells, bool emphasised) {
-  rows_.push_back({std::move(cells), false, emphasised});
+  rows_.push_back({std::move(cells), Row::Kind::cells, emphasised});
+}
+
+void TextTable::below(const std::string& text, std::size_t width) {
+  const std::string indent(6, ' ');
+  for (const std::string& line : wrapped(text, width - indent.size())) {
+    rows_.push_back({{indent + line}, Row::Kind::lines, false});
+  }
 }
 
 void TextTable::wrap(std::size_t width) {
@@ -48,7 +55,7 @@ std::string TextTable::text(const TextStyle& style) const {
   };
   fit(heading_, 0);
   for (const Row& row : rows_) {
-    if (!row.is_group) fit(row.cells, 2);
+    if (row.kind == Row::Kind::cells) fit(row.cells, 2);
   }
   if (width_ > 0) {
     std::size_t before = 0;
@@ -70,8 +77,8 @@ std::string TextTable::text(const TextStyle& style) const {
   for (std::size_t i = 2; i < total; ++i) text += style.unicode ? "─" : "-";
   text += '\n';
   for (const Row& row : rows_) {
-    if (row.is_group) {
-      text += style.bold(row.cells.front()) + '\n';
+    if (row.kind != Row::Kind::cells) {
+      text += (row.kind == Row::Kind::group ? style.bold(row.cells.front()) : row.cells.front()) + '\n';
       continue;
     }
     std::vector<std::string> cells = row.cells;

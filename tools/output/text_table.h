@@ -23,6 +23,9 @@ class TextTable {
   /// As many cells as the heading has, or fewer. An emphasised row is drawn to catch the eye.
   void row(std::vector<std::string> cells, bool emphasised = false);
 
+  /// Lines of their own below the last row, indented, of at most `width` characters.
+  void below(const std::string& text, std::size_t width);
+
   /// Aligns a column to the left.
   void left(std::size_t column) { is_left_.at(column) = true; }
 
@@ -33,8 +36,9 @@ class TextTable {
 
  private:
   struct Row {
+    enum class Kind { cells, group, lines };
     std::vector<std::string> cells;
-    bool is_group;
+    Kind kind;
     bool emphasised;
   };
   std::vector<std::string> heading_;

@@ -104,10 +104,8 @@ const BuiltinSceneInfo& builtin_scene_named(const std::string& name) {
   for (const BuiltinSceneInfo& info : builtin_scenes()) {
     if (info.name == name) return info;
   }
-  std::string all;
-  for (const BuiltinSceneInfo& info : builtin_scenes()) all += (all.empty() ? "" : ", ") + info.name;
   throw UserError("unknown built-in scene", "builtin:" + name, "there is none of that name",
-                  "did you mean builtin:" + nearest_name(name, builtin_scene_names()) + "? There are " + all);
+                  suggestion(name, builtin_scene_names(), "", "builtin:"));
 }
 
 BuiltinScene make_builtin_scene(const std::string& name, unsigned threads) {

@@ -82,7 +82,8 @@ std::vector<std::string> write_splat(const std::filesystem::path& path, const Ga
   file.commit();
   std::vector<std::string> left_out;
   if (scene.sh_degree() > 0) {
-    left_out.push_back("spherical harmonics of degree 1 to " + std::to_string(scene.sh_degree()) +
+    left_out.push_back("spherical harmonics of degree 1" +
+                       (scene.sh_degree() > 1 ? " to " + std::to_string(scene.sh_degree()) : std::string()) +
                        " are left out: a .splat has none");
   }
   if (scene.compensates_opacity()) {

@@ -338,6 +338,9 @@ std::string reduced_json(const std::string& text, const std::string& where, std:
 }  // namespace
 
 std::string reduced_gltf(const std::string& bytes, const std::string& where, std::vector<std::uint64_t>& triangles) {
+  if (!begins_as_gltf(bytes)) {
+    throw UserError("cannot read mesh", where, kNoGltf, "get the file again, or name it by its format");
+  }
   if (bytes.compare(0, 4, kGlbMagic) != 0) return reduced_json(bytes, where, {}, triangles);
   const auto cut_short = [&] {
     return UserError("cannot read mesh", where, "it is cut short, or no .glb of version 2", "get the file again");

@@ -51,6 +51,9 @@ bool has_gltf_gaussians(const std::filesystem::path& path) {
   }
   std::string text(static_cast<std::size_t>(std::min<std::uint64_t>(size, kMostGltfText)), '\0');
   file.read(from, text.data(), text.size());
+  if (from == 0 && !text.empty() && !begins_as_gltf(text)) {
+    throw UserError("cannot read scene", path.string(), kNoGltf, "get the file again, or name it by its format");
+  }
   return mentions_gaussians(text);
 }
 

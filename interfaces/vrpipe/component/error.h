@@ -4,6 +4,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace vrpipe {
 
@@ -33,24 +34,17 @@ class SimulationFault : public std::logic_error {
   SimulationFault(const std::string& unit, unsigned long long cycle, const std::string& item);
 };
 
-/// The name in `known` with the smallest edit distance to `name`; empty when `known` is empty.
-template <class Names>
-std::string nearest_name(const std::string& name, const Names& known);
-
+/// Letters put in, left out, replaced, or swapped with the next one, to make `b` of `a`.
 std::size_t edit_distance(const std::string& a, const std::string& b);
 
-template <class Names>
-std::string nearest_name(const std::string& name, const Names& known) {
-  std::string best;
-  std::size_t best_distance = 0;
-  for (const auto& candidate : known) {
-    const std::size_t distance = edit_distance(name, candidate);
-    if (best.empty() || distance < best_distance) {
-      best = candidate;
-      best_distance = distance;
-    }
-  }
-  return best;
-}
+/// The one of `known` that `name` misspells: the nearest, if no more than a third of the letters are wrong (of three
+/// letters or fewer, one). A name without dots may be the last part of one with some. Empty when none is near.
+std::string near_name(const std::string& name, const std::vector<std::string>& known);
+
+/// What to do about a `name` that is none of those `known`: "did you mean NAME?", where one is near, and which there are.
+/// @param lists   where all are listed, e.g. "`vrpipe units` lists all"; without it they are named here
+/// @param prefix  what stands before each where it is written, e.g. "builtin:"
+std::string suggestion(const std::string& name, const std::vector<std::string>& known, const std::string& lists = "",
+                       const std::string& prefix = "");
 
 }  // namespace vrpipe
