@@ -91,6 +91,18 @@ TEST_F(Diff, SaysOnOneScreenWhatWasAskedForAndWhatCameOfIt) {
     EXPECT_NE(all.find(each["key"].get<std::string>()), std::string::npos) << each;
 }
 
+TEST_F(Diff, RefusesResultsOfDifferentCommands) {
+  result("run.json", {"run", "--variant", "het"});
+  result("compare.json", {"compare"});
+  ASSERT_EQ(vrpipe({"microbench", "kill-rate", "--json", "bench.json"}).code, 0);
+  refused({"diff", "compare.json", "bench.json"},
+          {"results of different commands", "(bench.json)", "vrpipe.microbench/1", "compare.json of vrpipe.compare/1"});
+  // These hold the same: a run of one is matched with that of the other.
+  const json changed = diff("run.json", "compare.json");
+  EXPECT_EQ(changed["only_in_b"], json::array({"baseline", "qm", "het+qm"}));
+  EXPECT_TRUE(find(changed, "het", "cycles").is_null());
+}
+
 TEST_F(Diff, MatchesRunsAndUnitsByName) {
   result("a.json", {"compare", "--variant", "het", "--variant", "baseline"});
   result("b.json", {"compare", "--variant", "baseline", "--variant", "mine=het,tc.bins=2", "--relative-to", "mine"});

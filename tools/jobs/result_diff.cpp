@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/component/printable.h>
 
 namespace vrpipe::tools {
 namespace {
@@ -158,6 +159,19 @@ std::optional<TimePair::Time> time_of(const std::string& name, const nlohmann::o
                         speedups.is_object() ? number_in(speedups, name) : std::nullopt};
 }
 
+void check_same_command(const ResultFile& a, const ResultFile& b) {
+  const auto schema_of = [](const ResultFile& result) { return result.content["schema"].get<std::string>(); };
+  const auto content_of = [](const std::string& schema) {
+    return schema == "vrpipe.run/1" ? "vrpipe.compare/1" : schema;
+  };
+  const std::string of_a = schema_of(a), of_b = schema_of(b);
+  if (content_of(of_a) == content_of(of_b)) return;
+  throw UserError("results of different commands", b.path.string(),
+                  fmt::format("it is of schema {}, {} of {}", printable(of_b), printable(a.path.string()),
+                              printable(of_a)),
+                  "name two results of the same command");
+}
+
 /// A picture's file, from where vrpipe runs or from where the result is.
 std::optional<fs::path> picture_of(const nlohmann::ordered_json& run, const ResultFile& result) {
   const nlohmann::ordered_json exr = run.value("/images/exr"_json_pointer, nlohmann::ordered_json());
@@ -235,6 +249,7 @@ std::optional<double> Difference::change_percent() const {
 }
 
 ResultDiff diff_results(ResultFile a, ResultFile b) {
+  check_same_command(a, b);
   ResultDiff diff{std::move(a), std::move(b), {}, {}, {}, {}, {}};
   const auto runs_a = compared_runs(diff.a.content), runs_b = compared_runs(diff.b.content);
   const auto common = [](nlohmann::ordered_json content, bool has_runs) {

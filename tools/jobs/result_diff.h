@@ -65,7 +65,8 @@ struct ResultDiff {
 };
 
 /// Compares all but what the host and the command line make: seconds, load, names of files. Elements that have a name are
-/// matched by it, others by their place.
+/// matched by it, others by their place. Throws UserError for results of different commands, unless these are `run` and
+/// `compare`, which hold the same.
 ResultDiff diff_results(ResultFile a, ResultFile b);
 
 }  // namespace vrpipe::tools
