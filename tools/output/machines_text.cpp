@@ -13,18 +13,23 @@
 namespace vrpipe::tools {
 namespace {
 
-std::string common_text(const RunRequest& request, const std::vector<Setting>& preprocessing, std::uint32_t passes) {
-  std::string text = fmt::format("{} fidelity, {} colour, {} termination", fidelity_of(request),
-                                 vrpipe::name_of(request.format), name_of(request.termination));
-  if (passes > 1) text += fmt::format(", {} passes", passes);
-  text += effects_choice_text(request);
+std::string common_text(const RunRequest& request, const std::vector<Setting>& preprocessing, std::uint32_t passes,
+                        const std::vector<std::string>& axes) {
+  std::string text;
+  const auto add = [&](const char* axis, const std::string& part) {
+    if (std::find(axes.begin(), axes.end(), axis) == axes.end()) text += (text.empty() ? "" : ", ") + part;
+  };
+  add("fidelity", fidelity_of(request) + " fidelity");
+  add("format", std::string(vrpipe::name_of(request.format)) + " colour");
+  add("termination", std::string(name_of(request.termination)) + " termination");
+  if (passes > 1) add("multi-pass", fmt::format("{} passes", passes));
+  if (const std::string effects = effects_choice_text(request); !effects.empty()) add("", effects.substr(2));
   for (const std::vector<Setting>* settings : {&request.settings, &preprocessing}) {
-    for (const Setting& setting : *settings) {
-      text += fmt::format(", {}.{}={}", setting.unit, setting.parameter, setting.value);
-    }
+    for (const Setting& setting : *settings)
+      add("", fmt::format("{}.{}={}", setting.unit, setting.parameter, setting.value));
   }
-  for (const UnitChoice& unit : request.units) text += fmt::format(", {}={}", unit.slot, unit.implementation);
-  return text + "\n";
+  for (const UnitChoice& unit : request.units) add("", fmt::format("{}={}", unit.slot, unit.implementation));
+  return text.empty() ? text : text + "\n";
 }
 
 std::string platform_line(const Platform& platform, const TextStyle& style) {
@@ -41,7 +46,7 @@ bool is_first(const std::string& name, std::vector<std::string>& seen) {
 }  // namespace
 
 std::string machines_text(const std::vector<RunResult>& runs, const std::vector<Setting>& preprocessing,
-                          std::uint32_t passes, const TextStyle& style) {
+                          std::uint32_t passes, const TextStyle& style, const std::vector<std::string>& axes) {
   std::string text;
   std::vector<std::string> platforms, variants;
   for (const RunResult& run : runs) {
@@ -50,7 +55,7 @@ std::string machines_text(const std::vector<RunResult>& runs, const std::vector<
   }
   RunRequest common = runs.front().request;
   common.fidelity = finest_fidelity_of(runs);
-  text += common_text(common, preprocessing, passes);
+  text += common_text(common, preprocessing, passes, axes);
   for (const RunResult& run : runs) {
     const Variant& variant = run.request.variant;
     if (variant.base.empty() || !is_first(variant.name, variants)) continue;
@@ -62,7 +67,7 @@ std::string machines_text(const std::vector<RunResult>& runs, const std::vector<
 }
 
 std::string machine_text(const RunRequest& request, const TextStyle& style) {
-  return platform_line(*request.platform, style) + common_text(request, {}, 1);
+  return platform_line(*request.platform, style) + common_text(request, {}, 1, {});
 }
 
 }  // namespace vrpipe::tools
