@@ -1,6 +1,9 @@
 // `vrpipe diff`: what differs between two results.
 #include "tool_test_support.h"
 
+#include <regex>
+#include <sstream>
+
 namespace vrpipe::testing {
 namespace {
 
@@ -55,6 +58,51 @@ TEST_F(Diff, NamesTheSettingAndWhatCameOfIt) {
   EXPECT_TRUE(find(changed, "", "platform.origins.tc.bins").is_null());
 }
 
+// A parameter changes hundreds of numbers.
+TEST_F(Diff, SaysOnOneScreenWhatWasAskedForAndWhatCameOfIt) {
+  result("a.json", {"compare"});
+  result("b.json", {"compare", "--set", "tc.bins=2"});
+  const std::string text = vrpipe({"diff", "a.json", "b.json"}).out;
+  EXPECT_LT(std::count(text.begin(), text.end(), '\n'), 40) << text;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 100U) << line;
+  const json a = json::parse(read_file(folder() / "a.json")), b = json::parse(read_file(folder() / "b.json"));
+  for (std::size_t run = 0; run < 4; ++run) {
+    const std::uint64_t from = a["runs"][run]["cycles"], to = b["runs"][run]["cycles"];
+    const std::string name = a["runs"][run]["name"];
+    std::smatch row;
+    ASSERT_TRUE(std::regex_search(text, row,
+                                  std::regex("\n  " + std::regex_replace(name, std::regex("\\+"), "\\+") +
+                                             " +([0-9,]+) +([0-9,]+) +([0-9.]+) +([0-9.x-]+) +([0-9.x-]+)")))
+        << text;
+    EXPECT_EQ(std::regex_replace(row[1].str(), std::regex(","), ""), std::to_string(from));
+    EXPECT_EQ(std::regex_replace(row[2].str(), std::regex(","), ""), std::to_string(to));
+    EXPECT_NEAR(std::stod(row[3]), static_cast<double>(to) / static_cast<double>(from), 0.0005);
+    if (name == "baseline") continue;
+    EXPECT_NEAR(std::stod(row[4]), a["speedup"][name].get<double>(), 0.005);
+    EXPECT_NEAR(std::stod(row[5]), b["speedup"][name].get<double>(), 0.005);
+  }
+  EXPECT_LT(text.find("platform.parameters.tc.bins"), text.find("speed-up A"));
+  EXPECT_LT(text.find("speed-up A"), text.find("statistics that changed most"));
+  EXPECT_EQ(text.find("buckets"), std::string::npos);
+  EXPECT_EQ(text.find("units.gpc0"), std::string::npos);
+  const std::string all = vrpipe({"diff", "a.json", "b.json", "--all"}).out;
+  for (const json& each : diff()["differences"])
+    EXPECT_NE(all.find(each["key"].get<std::string>()), std::string::npos) << each;
+}
+
+TEST_F(Diff, RefusesResultsOfDifferentCommands) {
+  result("run.json", {"run", "--variant", "het"});
+  result("compare.json", {"compare"});
+  ASSERT_EQ(vrpipe({"microbench", "kill-rate", "--json", "bench.json"}).code, 0);
+  refused({"diff", "compare.json", "bench.json"},
+          {"results of different commands", "(bench.json)", "vrpipe.microbench/1", "compare.json of vrpipe.compare/1"});
+  // These hold the same: a run of one is matched with that of the other.
+  const json changed = diff("run.json", "compare.json");
+  EXPECT_EQ(changed["only_in_b"], json::array({"baseline", "qm", "het+qm"}));
+  EXPECT_TRUE(find(changed, "het", "cycles").is_null());
+}
+
 TEST_F(Diff, MatchesRunsAndUnitsByName) {
   result("a.json", {"compare", "--variant", "het", "--variant", "baseline"});
   result("b.json", {"compare", "--variant", "baseline", "--variant", "mine=het,tc.bins=2", "--relative-to", "mine"});
@@ -92,7 +140,7 @@ TEST_F(Diff, OfPicturesOfTwoSizesSaysSo) {
   EXPECT_EQ(find(other, "", "scene.width")["group"], "drawn");
 }
 
-TEST_F(Diff, TakesResultsOfOtherCommands) {
+TEST_F(Diff, TakesResultsOfOtherCommandsThanCompare) {
   for (const char* file : {"a.json", "b.json"}) {
     const std::string seed = file == std::string("a.json") ? "300" : "400";
     const Finished finished = vrpipe({"microbench", "kill-rate", "--set", "l2.latency_cycles=" + seed, "--json", file});

@@ -76,6 +76,75 @@ TEST_F(Sweep, HasOnePointWhereNoUnitDeclaresTheParameterOfAnAxis) {
   EXPECT_EQ(values(list), (std::vector<std::vector<json>>{{"baseline", nullptr}, {"qm", 8}}));
 }
 
+// Found a month later, results say what they are of.
+TEST_F(Sweep, SaysWhatAllPointsHaveInCommon) {
+  const std::string study = "scene = \"tiny.spl\"\nformat = \"rgba8\"\n[set]\ntgc.bins = 9\n[axes]\ntc.bins = [4, 8]\n";
+  write("study.toml", study);
+  const Finished finished =
+      vrpipe({"sweep", "study.toml", "--fidelity", "lt", "--jobs", "2", "--json", "s.json", "--html=s.html"});
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  const json result = json::parse(read_file(folder() / "s.json"));
+  const json run = json_of({"run", "--scene", "tiny.spl", "--format", "rgba8", "--fidelity", "lt", "--variant",
+                            result["variant"], "--set", "tgc.bins=9"});
+  for (const char* key : {"name", "gaussians_total", "gaussians_visible", "width", "height"})
+    EXPECT_EQ(result["scene"][key], run["scene"][key]) << key;
+  for (const char* key : {"fidelity", "format", "termination", "passes", "version", "plugins"})
+    EXPECT_EQ(result[key], run[key]) << key;
+  EXPECT_EQ(result["platform"]["name"], run["platform"]["name"]);
+  for (const auto& [name, value] : run["platform"]["parameters"].items()) {
+    if (name == "tc.bins") continue;
+    EXPECT_EQ(result["platform"]["parameters"][name], value) << name;
+    const json origin = name == "tgc.bins" ? json("file") : run["platform"]["origins"][name];
+    EXPECT_EQ(result["platform"]["origins"][name], origin) << name;
+  }
+  EXPECT_FALSE(result["platform"]["parameters"].contains("tc.bins")) << "points say it";
+  EXPECT_EQ(result["config"], "study.toml");
+  EXPECT_EQ(result["command"], json::array({"vrpipe", "sweep", "study.toml", "--fidelity", "lt"}))
+      << "who simulates and writes it is not of the result";
+  EXPECT_EQ(result["options"],
+            json({{"scene", {"tiny.spl"}}, {"set", {"tgc.bins=9"}}, {"fidelity", {"lt"}}, {"format", {"rgba8"}}}));
+  EXPECT_EQ(finished.out.find("tiny.spl, 48x40: 60 of 60 Gaussians visible\n"), 0U) << finished.out;
+  EXPECT_NE(finished.out.find("\nlt fidelity, rgba8 colour, "), std::string::npos) << finished.out;
+  EXPECT_NE(finished.out.find(", tgc.bins=9\n"), std::string::npos) << finished.out;
+  const std::string page = read_file(folder() / "s.html");
+  EXPECT_NE(page.find("<title>vrpipe sweep: study.toml</title>"), std::string::npos);
+  for (const char* fact : {"tiny.spl, 48x40", "lt fidelity, rgba8 colour", "sweep study.toml --fidelity lt</code>"})
+    EXPECT_NE(page.find(fact), std::string::npos) << fact;
+}
+
+TEST_F(Sweep, SaysOfWhatAxesSayNothingElse) {
+  write("study.toml",
+        "[axes]\nscene = [\"builtin:object\"]\nsize = [\"16x16\", \"24x16\"]\nplatform = [\"mobile\", \"desktop\"]\n"
+        "fidelity = [\"functional\"]\nformat = [\"rgba8\"]\n");
+  const std::string text = vrpipe({"sweep", "study.toml", "--json", "s.json"}).out;
+  const json result = json::parse(read_file(folder() / "s.json"));
+  for (const char* key : {"platform", "fidelity", "format"}) EXPECT_TRUE(result[key].is_null()) << key;
+  EXPECT_TRUE(result["scene"]["width"].is_null());
+  EXPECT_EQ(result["scene"]["name"], "builtin:object");
+  EXPECT_GT(result["scene"]["gaussians_total"], 0);
+  for (const char* platform : {"mobile (", "desktop ("}) EXPECT_NE(text.find(platform), std::string::npos) << text;
+  for (const char* not_of_all : {"functional fidelity", "rgba8 colour"})
+    EXPECT_EQ(text.find(not_of_all), std::string::npos) << text;
+  EXPECT_EQ(text.find("speed-ups are over"), std::string::npos) << "nothing has time";
+}
+
+TEST_F(Sweep, SaysWhichAxesHaveNoEffect) {
+  // Of a 48x40 image there are fewer tile grids than bins.
+  const std::string axes = "[axes]\nvariant = [\"baseline\", \"qm\"]\ntgc.bins = [64, 128]\n";
+  const json timed = sweep(small_sweep + axes);
+  EXPECT_EQ(timed["without_effect"], json({{{"axis", "tgc.bins"}, {"on", "results"}}}));
+  const std::string text = vrpipe({"sweep", "study.toml"}).out;
+  EXPECT_NE(text.find("\ntgc.bins: no effect\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("\n3 points: 4 combinations, of which 1 is the same as another"), std::string::npos) << text;
+  const std::string cycles = timed["points"][0]["cycles"].dump();
+  ASSERT_GT(cycles.size(), 3U);
+  EXPECT_NE(text.find(cycles.substr(0, cycles.size() - 3) + "," + cycles.substr(cycles.size() - 3)), std::string::npos)
+      << text;
+  const json untimed = sweep("scene = \"tiny.spl\"\nfidelity = \"functional\"\n" + axes);
+  EXPECT_EQ(untimed["without_effect"], timed["without_effect"]);
+  EXPECT_EQ(sweep(small_sweep + "[axes]\ncrop.bytes_per_cycle = [16, 64]\n")["without_effect"], json::array());
+}
+
 TEST_F(Sweep, ItsPageHasVariantsBySceneWithTheirGeometricMean) {
   write_draw_list(folder() / "other.spl", [] {
     Draw draw = tiny_draw();
@@ -329,15 +398,17 @@ TEST_F(Sweep, KilledAtAnyMomentEndsWithTheSameBytes) {
 TEST_F(Sweep, InShardsIsTheSameAsAlone) {
   const std::string study = small_sweep + "[axes]\nvariant = [\"baseline\", \"qm\", \"het\"]\ntc.bins = [4, 32]\n";
   write("study.toml", study);
-  ASSERT_EQ(vrpipe({"sweep", "study.toml", "--csv", "alone.csv"}).code, 0);
+  ASSERT_EQ(vrpipe({"sweep", "study.toml", "--csv", "alone.csv", "--json", "alone.json"}).code, 0);
   for (const char* shard : {"2/3", "1/3", "3/3"}) {
     const Finished finished = vrpipe({"sweep", "study.toml", "--journal", "j", "--shard", shard});
     ASSERT_EQ(finished.code, 0) << finished.err;
     EXPECT_NE(finished.out.find("its 2 points are done"), std::string::npos) << finished.out;
   }
-  const Finished merged = vrpipe({"sweep", "study.toml", "--journal", "j", "--csv", "merged.csv"});
+  const Finished merged =
+      vrpipe({"sweep", "study.toml", "--journal", "j", "--csv", "merged.csv", "--json", "merged.json"});
   EXPECT_NE(merged.err.find("6 of 6 points were done before"), std::string::npos) << merged.err;
-  EXPECT_EQ(read_file(folder() / "merged.csv"), read_file(folder() / "alone.csv"));
+  for (const std::string format : {"csv", "json"})
+    EXPECT_EQ(read_file(folder() / ("merged." + format)), read_file(folder() / ("alone." + format)));
 }
 
 TEST_F(Sweep, ThatGrowsKeepsWhatIsDone) {
@@ -373,10 +444,11 @@ std::string under_mpi(const std::filesystem::path& folder, unsigned ranks, const
 TEST_F(Sweep, OverMpiRanksIsTheSameAsAlone) {
   if (!has_mpi()) GTEST_SKIP() << "built or run without MPI";
   write("study.toml", small_sweep + "[axes]\nvariant = [\"baseline\", \"qm\", \"het\"]\ntc.bins = [4, 32]\n");
-  ASSERT_EQ(vrpipe({"sweep", "study.toml", "--csv", "alone.csv"}).code, 0);
-  ASSERT_EQ(std::system(under_mpi(folder(), 3, "sweep study.toml --csv mpi.csv").c_str()), 0)
+  ASSERT_EQ(vrpipe({"sweep", "study.toml", "--csv", "alone.csv", "--json", "alone.json"}).code, 0);
+  ASSERT_EQ(std::system(under_mpi(folder(), 3, "sweep study.toml --csv mpi.csv --json mpi.json").c_str()), 0)
       << read_file(folder() / "mpi.err");
   EXPECT_EQ(read_file(folder() / "mpi.csv"), read_file(folder() / "alone.csv"));
+  EXPECT_EQ(read_file(folder() / "mpi.json"), read_file(folder() / "alone.json"));
   const std::string out = read_file(folder() / "mpi.out");
   EXPECT_EQ(out.find("6 points"), out.rfind("6 points")) << "one rank says it";
 }
@@ -452,7 +524,9 @@ TEST_F(Sweep, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
   known = documented(section, "JSON");
   known.insert("schema");
   expect_documented(
-      {sweep("sample = 2\n" + small_sweep + "[axes]\nvariant = [\"baseline\", \"het\"]\ntc.bins = [3, 4]\n")}, known);
+      {sweep("sample = 2\n" + small_sweep + "[axes]\nvariant = [\"baseline\", \"het\"]\ntc.bins = [3, 4]\n"),
+       sweep(small_sweep + "[axes]\nvariant = [\"qm\"]\ntgc.bins = [64, 128]\n", {"--plugin", TEST_PLUGIN})},
+      known);
 }
 
 }  // namespace

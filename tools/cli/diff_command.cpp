@@ -22,12 +22,14 @@ class DiffCommand : public Command {
   void declare(Arguments& arguments) override {
     arguments.add_positional("A.json", a_, "a result that --json wrote");
     arguments.add_positional("B.json", b_, "another one");
-    arguments.add_flag("--all", all_, "every statistic that differs, not only those that changed most", result_group);
+    arguments.add_flag("--all", all_, "everything that differs: units, effects, counts, every statistic", result_group);
     declare_json(arguments, json_, "differences");
     arguments.set_footer(
-        "Says what was asked for otherwise, what came out otherwise, and by how much. Runs, units and statistics are\n"
-        "matched by name. Pictures are compared where both results have them (--output). What the host makes is left\n"
-        "out: seconds, load, names of files. Exit code 0 whether they differ or not; JSON has `equal`.\n"
+        "Says what was asked for otherwise, the cycles of both, and which statistics changed most. The results are of\n"
+        "the same command; runs, units and statistics are matched by name. Pictures are compared where both results\n"
+        "have them (--output). What the host makes is left out: seconds, load, names of files. Exit code 0 whether "
+        "they\n"
+        "differ or not; JSON has `equal`.\n"
         "\n"
         "Examples:\n"
         "  vrpipe diff before.json after.json\n"

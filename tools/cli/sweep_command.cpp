@@ -56,6 +56,25 @@ Shard parse_shard(const std::string& text) {
   throw refuse();
 }
 
+/// Whether results depend on an option, or only who makes them and where they go.
+bool is_of_results(const Option& option) { return option.group != result_group || option.name == "--relative-to"; }
+
+/// The words of a command line without such options, and without the program's folder, which mpirun may say otherwise.
+std::vector<std::string> words_of_results(const Invocation& invocation) {
+  std::vector<std::string> words;
+  for (std::size_t i = 0; i < invocation.words.size(); ++i) {
+    const std::string& word = invocation.words[i];
+    const Option* const option = invocation.arguments->find(word.substr(0, word.find('=')));
+    if (option == nullptr || option->kind == Option::Kind::positional || is_of_results(*option)) {
+      words.push_back(word);
+    } else if (option->kind == Option::Kind::text && word == option->name) {
+      ++i;
+    }
+  }
+  words.front() = std::filesystem::path(words.front()).filename().string();
+  return words;
+}
+
 class SweepCommand : public Command {
  public:
   std::string name() const override { return "sweep"; }
@@ -144,6 +163,11 @@ class SweepCommand : public Command {
     const auto variants = job.study.axis("variant");
     job.common = arguments_.resolve(SimulationArguments::Variants::one, invocation(),
                                     variants ? job.study.axes[*variants].values : std::vector<std::string>());
+    job.common.provenance.command = words_of_results(invocation());
+    for (const Option& option : invocation().arguments->options()) {
+      if (option.kind != Option::Kind::positional && option.is_given() && is_of_results(option))
+        job.options.emplace_back(option.name.substr(2), option.texts);
+    }
     leave_out_absent(job);
     choose_references(job);
     job.csv = single_path(csv_, "--csv");

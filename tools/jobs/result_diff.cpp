@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/component/printable.h>
 
 namespace vrpipe::tools {
 namespace {
@@ -71,7 +72,7 @@ void flatten(const nlohmann::ordered_json& value, const std::string& path,
 }
 
 DiffGroup group_of(const std::string& key) {
-  static const std::array<std::pair<const char*, DiffGroup>, 34> groups{{
+  static const std::array<std::pair<const char*, DiffGroup>, 35> groups{{
       {"schema", DiffGroup::made_by},
       {"version", DiffGroup::made_by},
       {"plugins", DiffGroup::made_by},
@@ -90,6 +91,7 @@ DiffGroup group_of(const std::string& key) {
       {"format", DiffGroup::settings},
       {"termination", DiffGroup::settings},
       {"relative_to", DiffGroup::settings},
+      {"axes", DiffGroup::settings},
       {"implementations", DiffGroup::units},
       {"quad_merging_storage_bytes", DiffGroup::units},
       {"effects", DiffGroup::effects},
@@ -140,6 +142,34 @@ std::vector<std::pair<std::string, const nlohmann::ordered_json*>> compared_runs
   const std::vector<std::string> names = element_names(*found);
   for (std::size_t i = 0; i < names.size(); ++i) runs.emplace_back(names[i], &(*found)[i]);
   return runs;
+}
+
+std::optional<double> number_in(const nlohmann::ordered_json& object, const std::string& key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number() ? std::optional(found->get<double>()) : std::nullopt;
+}
+
+/// None where nothing has time.
+std::optional<TimePair::Time> time_of(const std::string& name, const nlohmann::ordered_json& run,
+                                      const nlohmann::ordered_json& result) {
+  const auto cycles = run.find("cycles");
+  if (cycles == run.end() || !cycles->is_number_unsigned()) return std::nullopt;
+  const nlohmann::ordered_json speedups = result.value("speedup", nlohmann::ordered_json());
+  return TimePair::Time{cycles->get<std::uint64_t>(), number_in(run, "milliseconds"),
+                        speedups.is_object() ? number_in(speedups, name) : std::nullopt};
+}
+
+void check_same_command(const ResultFile& a, const ResultFile& b) {
+  const auto schema_of = [](const ResultFile& result) { return result.content["schema"].get<std::string>(); };
+  const auto content_of = [](const std::string& schema) {
+    return schema == "vrpipe.run/1" ? "vrpipe.compare/1" : schema;
+  };
+  const std::string of_a = schema_of(a), of_b = schema_of(b);
+  if (content_of(of_a) == content_of(of_b)) return;
+  throw UserError("results of different commands", b.path.string(),
+                  fmt::format("it is of schema {}, {} of {}", printable(of_b), printable(a.path.string()),
+                              printable(of_a)),
+                  "name two results of the same command");
 }
 
 /// A picture's file, from where vrpipe runs or from where the result is.
@@ -219,7 +249,8 @@ std::optional<double> Difference::change_percent() const {
 }
 
 ResultDiff diff_results(ResultFile a, ResultFile b) {
-  ResultDiff diff{std::move(a), std::move(b), {}, {}, {}, {}};
+  check_same_command(a, b);
+  ResultDiff diff{std::move(a), std::move(b), {}, {}, {}, {}, {}};
   const auto runs_a = compared_runs(diff.a.content), runs_b = compared_runs(diff.b.content);
   const auto common = [](nlohmann::ordered_json content, bool has_runs) {
     if (has_runs) content.erase("runs");
@@ -244,6 +275,8 @@ ResultDiff diff_results(ResultFile a, ResultFile b) {
     flatten(*other->second, "", of_b);
     compare(of_a, of_b, name, diff.differences);
     diff.pictures.push_back(compare_pictures(name, *run, *other->second, diff.a, diff.b));
+    const auto time_a = time_of(name, *run, diff.a.content), time_b = time_of(name, *other->second, diff.b.content);
+    if (time_a && time_b) diff.times.push_back({name, *time_a, *time_b});
   }
   for (const auto& [name, run] : runs_b) {
     if (find(runs_a, name) == runs_a.end()) diff.only_in_b.push_back(name);

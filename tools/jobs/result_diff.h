@@ -44,16 +44,29 @@ struct PictureDiff {
   std::string why_none;             ///< why there is no error
 };
 
+/// The time that a run takes in both results.
+struct TimePair {
+  struct Time {
+    std::uint64_t cycles = 0;
+    std::optional<double> milliseconds;
+    std::optional<double> speedup;  ///< over the run that the result names
+  };
+  std::string run;
+  Time a, b;
+};
+
 struct ResultDiff {
   ResultFile a, b;
   std::vector<Difference> differences;            ///< by group, then in the order of the results
   std::vector<std::string> only_in_a, only_in_b;  ///< names of runs
   std::vector<PictureDiff> pictures;              ///< of the runs in both
+  std::vector<TimePair> times;                    ///< of the runs that have time in both, also the same
   bool equal() const { return differences.empty() && only_in_a.empty() && only_in_b.empty(); }
 };
 
 /// Compares all but what the host and the command line make: seconds, load, names of files. Elements that have a name are
-/// matched by it, others by their place.
+/// matched by it, others by their place. Throws UserError for results of different commands, unless these are `run` and
+/// `compare`, which hold the same.
 ResultDiff diff_results(ResultFile a, ResultFile b);
 
 }  // namespace vrpipe::tools

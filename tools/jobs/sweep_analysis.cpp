@@ -6,6 +6,7 @@
 #include <initializer_list>
 #include <limits>
 #include <map>
+#include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -165,6 +166,55 @@ AxisEffects axis_effects(const SweepResult& result, const SweepTable& table) {
   std::stable_sort(all.effects.begin(), all.effects.end(),
                    [](const AxisEffect& a, const AxisEffect& b) { return a.ratio > b.ratio; });
   return all;
+}
+
+std::vector<IdleAxis> idle_axes(const SweepResult& result) {
+  std::vector<IdleAxis> idle;
+  for (std::size_t axis = 0; axis < result.study.axes.size(); ++axis) {
+    std::map<std::vector<std::size_t>, const RunResult*> first_of;  // by the values on all other axes
+    std::size_t pairs = 0;
+    bool same_time = true, same_results = true;
+    for (std::size_t i = 0; i < result.points.size(); ++i) {
+      std::vector<std::size_t> others = result.study.points[i].values;
+      if (!result.points[i] || others[axis] == no_value) continue;
+      others[axis] = no_value;
+      const RunResult& run = result.points[i]->run;
+      const auto [first, is_new] = first_of.emplace(std::move(others), &run);
+      // What ends in a fault is like nothing else.
+      same_time = same_time && result.points[i]->fault.empty();
+      if (is_new) continue;
+      ++pairs;
+      same_time = same_time && run.cycles == first->second->cycles && run.milliseconds == first->second->milliseconds;
+      same_results = same_results && run.result_hash == first->second->result_hash;
+    }
+    const bool is_timed = std::any_of(result.points.begin(), result.points.end(),
+                                      [](const auto& point) { return point && point->run.cycles; });
+    if (pairs > 0 && same_time && (same_results || is_timed)) idle.push_back({axis, !same_results});
+  }
+  return idle;
+}
+
+CommonScene common_scene(const SweepResult& result) {
+  std::vector<const DrawnScene*> drawn;
+  for (const auto& point : result.points) {
+    if (point && point->fault.empty()) drawn.push_back(&point->drawn);
+  }
+  const auto common = [&](const auto& value_of) {
+    using Value = std::decay_t<decltype(value_of(*drawn.front()))>;
+    const bool all = !drawn.empty() && std::all_of(drawn.begin(), drawn.end(), [&](const DrawnScene* each) {
+      return value_of(*each) == value_of(*drawn.front());
+    });
+    return all ? std::optional<Value>(value_of(*drawn.front())) : std::nullopt;
+  };
+  CommonScene scene;
+  scene.name = common([](const DrawnScene& each) { return each.name; });
+  // Numbers of several scenes say nothing of any.
+  if (scene.name) {
+    scene.gaussians_total = common([](const DrawnScene& each) { return each.gaussians_total; });
+    scene.gaussians_visible = common([](const DrawnScene& each) { return each.gaussians_visible; });
+  }
+  scene.size = common([](const DrawnScene& each) { return std::pair{each.width, each.height}; });
+  return scene;
 }
 
 std::optional<GroupedMeans> grouped_means(const SweepResult& result, const SweepTable& table, bool of_speedups) {

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -40,6 +43,21 @@ struct AxisEffects {
   std::vector<AxisEffect> effects;
 };
 AxisEffects axis_effects(const SweepResult& result, const SweepTable& table);
+
+/// An axis that changes nothing: points that differ in it alone, of which there are some, come to the same.
+struct IdleAxis {
+  std::size_t axis = 0;
+  bool on_time_alone = false;  ///< these take the same time, but their results differ
+};
+std::vector<IdleAxis> idle_axes(const SweepResult& result);
+
+/// What all points have drawn; none where they differ.
+struct CommonScene {
+  std::optional<std::string> name;
+  std::optional<std::uint64_t> gaussians_total, gaussians_visible;
+  std::optional<std::pair<std::uint32_t, std::uint32_t>> size;  ///< width and height, pixels
+};
+CommonScene common_scene(const SweepResult& result);
 
 /// What is drawn, by what draws it, as papers show it: means of speed-ups, or of milliseconds where there are none, over all
 /// other axes.

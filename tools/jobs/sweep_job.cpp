@@ -105,6 +105,12 @@ class StudyFrames {
     return frame_.geometry.front();
   }
 
+  /// Of the last frame.
+  DrawnScene drawn() const {
+    const SceneSummary& scene = frame_.summary;
+    return {valid_utf8(scene.name), scene.gaussians_total, scene.gaussians_visible, frame_.width, frame_.height};
+  }
+
   std::shared_ptr<const Frame> frame(const StudiedPoint& point, const RunRequest& request) {
     const Drawn drawn = drawn_by(job_, point);
     if (!held_ || held_->key() != drawn.key()) load(drawn, options_of(drawn));
@@ -304,7 +310,10 @@ nlohmann::json to_sweep_record(const Study& study, std::size_t place, const Poin
           {"energy", point.energy ? nlohmann::json{point.energy->low, point.energy->nominal, point.energy->high}
                                   : nlohmann::json()},
           {"columns", columns},
-          {"cpu_seconds", point.cpu_seconds}};
+          {"cpu_seconds", point.cpu_seconds},
+          {"drawn",
+           {point.drawn.name, point.drawn.gaussians_total, point.drawn.gaussians_visible, point.drawn.width,
+            point.drawn.height}}};
 }
 
 /// Columns are statistics of some point. Throws UserError.
@@ -369,6 +378,12 @@ PointOutcome sweep_from_record(const nlohmann::json& record, const RunRequest& r
                             : value.is_string() ? std::optional(std::numeric_limits<double>::infinity())
                                                 : std::optional(value.get<double>()));
   record.at("cpu_seconds").get_to(point.cpu_seconds);
+  const nlohmann::json& drawn = record.at("drawn");
+  drawn.at(0).get_to(point.drawn.name);
+  drawn.at(1).get_to(point.drawn.gaussians_total);
+  drawn.at(2).get_to(point.drawn.gaussians_visible);
+  drawn.at(3).get_to(point.drawn.width);
+  drawn.at(4).get_to(point.drawn.height);
   return point;
 }
 
@@ -469,9 +484,12 @@ void simulate_rows(const SweepJob& job, const std::vector<RunRequest>& requests,
   });
   StudyFrames frames(job);
   std::vector<Task> tasks;
+  std::map<std::size_t, DrawnScene> drawn;
   for (const std::size_t i : missing) {
-    const auto frame = [&frames, &study, i](const RunRequest& request) {
-      return frames.frame(study.points[i], request);
+    const auto frame = [&frames, &study, &drawn, i](const RunRequest& request) {
+      std::shared_ptr<const Frame> of_point = frames.frame(study.points[i], request);
+      drawn[i] = frames.drawn();
+      return of_point;
     };
     tasks.push_back({fmt::format("point {}", i), requests[i], frame});
   }
@@ -483,6 +501,7 @@ void simulate_rows(const SweepJob& job, const std::vector<RunRequest>& requests,
     PointOutcome point;
     point.run = std::move(simulated.result);
     point.cpu_seconds = point.run.cpu_seconds;
+    point.drawn = std::move(drawn[i]);
     // A sum that misses something is none to rank GPUs by.
     const EnergyAmounts amounts = energy_amounts(point.run, shipped_energies());
     if (amounts.missing.empty()) point.energy = energy_report(amounts, shipped_energies()).total;
@@ -510,6 +529,28 @@ void simulate_rows(const SweepJob& job, const std::vector<RunRequest>& requests,
   };
   place.title = "sweep  ";
   if (!tasks.empty()) run_tasks(tasks, exact_images.has_value(), result.processes, place, progress, finished);
+}
+
+/// @param requests  of the points
+std::vector<RunResult> machines_of(const SweepJob& job, const std::vector<RunRequest>& requests) {
+  const Study& study = job.study;
+  std::vector<RunResult> machines;
+  std::set<std::pair<std::size_t, std::size_t>> seen;
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    if (!seen.insert(study.machine_of(study.points[i].values)).second) continue;
+    RunResult& machine = machines.emplace_back();
+    machine.request = job.common.requests.front();
+    machine.request.platform = requests[i].platform;
+    machine.request.variant = requests[i].variant;
+    machine.request.name = requests[i].name;
+    machine.request.fidelity = std::min(machine.request.fidelity, finest_fidelity(requests[i].variant));
+    // Of the first such point, whose settings are known to go together.
+    machine.parameters = requests[i].variant.is_of_pipeline() ? final_parameters(requests[i])
+                                                              : check_software(of_variant_alone(requests[i]));
+    const auto& preprocess = job.common.preprocess_parameters;
+    machine.parameters.insert(machine.parameters.end(), preprocess.begin(), preprocess.end());
+  }
+  return machines;
 }
 
 std::string to_message(const nlohmann::json& record) {
@@ -663,6 +704,9 @@ void choose_references(SweepJob& job) {
 SweepResult run_sweep(const SweepJob& job) {
   SweepResult result;
   result.provenance = job.common.provenance;
+  result.options = job.options;
+  result.preprocessing = job.common.preprocessing;
+  result.passes = job.common.frame.passes;
   result.study = job.study;
   result.points.resize(job.study.points.size());
   result.processes = job.common.processes;
@@ -677,6 +721,7 @@ SweepResult run_sweep(const SweepJob& job) {
     }
   }
   check_columns(job, requests);
+  result.machines = machines_of(job, requests);
   ProgressLine progress;
   const auto start = SteadyClock::now();
   const std::unique_ptr<Ranks> ranks = join_ranks();

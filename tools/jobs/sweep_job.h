@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <vrpipe/platforms/simulation.h>
@@ -23,6 +24,8 @@ struct Shard {
   bool has(std::size_t point) const { return point % count == index - 1; }
 };
 
+using GivenOptions = std::vector<std::pair<std::string, std::vector<std::string>>>;
+
 /// What a sweep is asked for.
 struct SweepJob {
   SimulationJob common;  ///< what all points share; of `requests` there is one
@@ -32,7 +35,17 @@ struct SweepJob {
   std::optional<std::filesystem::path> journal;  ///< none: one in the user's cache folder
   std::optional<std::filesystem::path> csv, jsonl, html;
 
+  /// What the command line and the study say of options, by name without dashes, of which results depend.
+  GivenOptions options;
+
   static constexpr const char* journal_option = "--journal";
+};
+
+/// A scene as a point drew it.
+struct DrawnScene {
+  std::string name;  ///< SceneSummary::name
+  std::uint64_t gaussians_total = 0, gaussians_visible = 0;
+  std::uint32_t width = 0, height = 0;  ///< pixels
 };
 
 /// What came of a point, without what the host made of it: the same however it was run.
@@ -44,10 +57,16 @@ struct PointOutcome {
   std::vector<std::optional<double>>
       columns;             ///< of Study::columns; none where the point has no such statistic, or no value
   double cpu_seconds = 0;  ///< of whoever ran it; in no result
+  DrawnScene drawn;
 };
 
 struct SweepResult {
   Provenance provenance;
+  GivenOptions options;
+  /// For each platform and variant of the study a request without other axes, and the parameters of its first point.
+  std::vector<RunResult> machines;
+  std::vector<Setting> preprocessing;  ///< what --set changed of it
+  std::uint32_t passes = 1;            ///< of points without such an axis
   Study study;
   std::vector<std::optional<PointOutcome>> points;  ///< by point of the study; none of other shards
   std::size_t done_before = 0;

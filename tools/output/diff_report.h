@@ -8,7 +8,8 @@
 
 namespace vrpipe::tools {
 
-/// What differs, for a person. Of statistics those that changed most, unless `all` are asked for.
+/// What differs, for a person, on one screen: what was asked for otherwise, cycles, and the statistics that changed most; or
+/// `all` differences.
 std::string diff_text(const ResultDiff& diff, bool all, const TextStyle& style);
 
 /// Schema vrpipe.diff/1.

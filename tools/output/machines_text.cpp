@@ -20,29 +20,37 @@ bool is_first(const std::string& name, std::vector<std::string>& seen) {
   return true;
 }
 
+/// @param axes      what is not the same for all is left out
 /// @param variants  those that the request is of
 std::string common_text(const RunRequest& request, const std::vector<Setting>& preprocessing, std::uint32_t passes,
-                        const std::vector<const Variant*>& variants) {
-  std::string text = fmt::format("{} fidelity, {} colour, {} termination", fidelity_of(request),
-                                 vrpipe::name_of(request.format), name_of(request.termination));
-  if (!request.variant.is_of_pipeline())
-    text = fmt::format("{} fidelity, colour and termination of its own", vrpipe::name_of(request.fidelity));
-  if (passes > 1) text += fmt::format(", {} passes", passes);
-  text += effects_choice_text(request);
+                        const std::vector<std::string>& axes, const std::vector<const Variant*>& variants) {
+  std::string text;
+  const auto add = [&](const char* axis, const std::string& part) {
+    if (std::find(axes.begin(), axes.end(), axis) == axes.end()) text += (text.empty() ? "" : ", ") + part;
+  };
+  if (request.variant.is_of_pipeline()) {
+    add("fidelity", fidelity_of(request) + " fidelity");
+    add("format", std::string(vrpipe::name_of(request.format)) + " colour");
+    add("termination", std::string(name_of(request.termination)) + " termination");
+  } else {
+    add("fidelity", std::string(vrpipe::name_of(request.fidelity)) + " fidelity");
+    add("", "colour and termination of its own");
+  }
+  if (passes > 1) add("multi-pass", fmt::format("{} passes", passes));
+  if (const std::string effects = effects_choice_text(request); !effects.empty()) add("", effects.substr(2));
   for (const std::vector<Setting>* settings : {&request.settings, &preprocessing}) {
-    for (const Setting& setting : *settings) {
-      text += fmt::format(", {}.{}={}", setting.unit, setting.parameter, setting.value);
-    }
+    for (const Setting& setting : *settings)
+      add("", fmt::format("{}.{}={}", setting.unit, setting.parameter, setting.value));
   }
   for (const UnitChoice& unit : request.units) {
-    text += fmt::format(", {}={}", unit.slot, unit.implementation);
     std::vector<std::string> others;
     for (const Variant* variant : variants) {
       if (own_unit(*variant, unit) != nullptr) is_first(variant->name, others);
     }
-    if (!others.empty()) text += printable(fmt::format(" (not in {}, with its own)", fmt::join(others, ", ")));
+    add("", fmt::format("{}={}", unit.slot, unit.implementation) +
+                (others.empty() ? "" : printable(fmt::format(" (not in {}, with its own)", fmt::join(others, ", ")))));
   }
-  return text + "\n";
+  return text.empty() ? text : text + "\n";
 }
 
 std::string platform_line(const Platform& platform, const TextStyle& style) {
@@ -52,7 +60,7 @@ std::string platform_line(const Platform& platform, const TextStyle& style) {
 }  // namespace
 
 std::string machines_text(const std::vector<RunResult>& runs, const std::vector<Setting>& preprocessing,
-                          std::uint32_t passes, const TextStyle& style) {
+                          std::uint32_t passes, const TextStyle& style, const std::vector<std::string>& axes) {
   std::string text;
   std::vector<std::string> platforms, variants;
   for (const RunResult& run : runs) {
@@ -66,7 +74,7 @@ std::string machines_text(const std::vector<RunResult>& runs, const std::vector<
   common.fidelity = finest_fidelity_of(runs);
   std::vector<const Variant*> of_runs;
   for (const RunResult& run : runs) of_runs.push_back(&run.request.variant);
-  text += common_text(common, preprocessing, passes, of_runs);
+  text += common_text(common, preprocessing, passes, axes, of_runs);
   for (const RunResult& run : runs) {
     const Variant& variant = run.request.variant;
     if (variant.base.empty() || !is_first(variant.name, variants)) continue;
@@ -78,7 +86,7 @@ std::string machines_text(const std::vector<RunResult>& runs, const std::vector<
 }
 
 std::string machine_text(const RunRequest& request, const TextStyle& style) {
-  return platform_line(*request.platform, style) + common_text(request, {}, 1, {});
+  return platform_line(*request.platform, style) + common_text(request, {}, 1, {}, {});
 }
 
 }  // namespace vrpipe::tools

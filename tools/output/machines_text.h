@@ -12,8 +12,9 @@ namespace vrpipe::tools {
 
 /// On what runs were simulated: a line for each platform, one on what was asked of all runs, and one for each variant
 /// that changes another. The runs are alike in everything else.
+/// @param axes  of a study: what these say (fidelity, format, termination, multi-pass) is left out
 std::string machines_text(const std::vector<RunResult>& runs, const std::vector<Setting>& preprocessing,
-                          std::uint32_t passes, const TextStyle& style);
+                          std::uint32_t passes, const TextStyle& style, const std::vector<std::string>& axes = {});
 
 /// Of a run whose platform and settings alone matter.
 std::string machine_text(const RunRequest& request, const TextStyle& style);

@@ -1,9 +1,12 @@
 #include <algorithm>
 #include <array>
+#include <filesystem>
+#include <sstream>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "output/machines_text.h"
 #include "output/page_parts.h"
 #include "output/sweep_report.h"
 
@@ -16,6 +19,9 @@ constexpr const char* other_color = "#8a949e";
 constexpr std::array<const char*, 8> series_colors{"#8a949e", "#0072b2", "#009e73", "#d1400f",
                                                    "#e69f00", "#56b4e9", "#7a3e9d", "#6b4a2b"};
 constexpr std::size_t most_rows = 5000;
+constexpr const char* facts_style =
+    "dl { display: grid; grid-template-columns: max-content 1fr; gap: 3px 18px; } dt { color: #5a6572; } "
+    "dd { margin: 0; overflow-wrap: anywhere; }";
 
 std::string cell(const Json& value) {
   if (value.is_null()) return {};
@@ -44,6 +50,28 @@ std::string words_of(const std::string& column) {
   std::replace_if(
       words.begin(), words.end(), [](char c) { return c == '_' || c == '.'; }, ' ');
   return words;
+}
+
+/// What was simulated, as far as it is the same for all points.
+std::string facts(const SweepResult& result, const CommonScene& scene) {
+  std::string text;
+  const auto add = [&](const char* name, const std::string& html) {
+    if (!html.empty()) text += fmt::format("<dt>{}</dt><dd>{}</dd>\n", name, html);
+  };
+  add("drawn", html_escaped(scene_line(scene)));
+  std::vector<std::string> axes;
+  for (const StudyAxis& axis : result.study.axes) axes.push_back(axis.name);
+  std::istringstream machines(machines_text(result.machines, result.preprocessing, result.passes, TextStyle(), axes));
+  for (std::string line; std::getline(machines, line);) add("simulated", html_escaped(line));
+  std::string options;
+  for (const auto& [name, texts] : result.options) {
+    for (const std::string& each : texts) options += fmt::format("{}{} = {}", options.empty() ? "" : ", ", name, each);
+  }
+  add("options", html_escaped(options));
+  add("command", "<code>" + html_escaped(command_text(result.provenance)) + "</code>");
+  for (const PluginFile& plugin : result.provenance.plugins)
+    add("plugin", html_escaped(plugin.path + ", SHA-256 " + plugin.sha256));
+  return "<dl>\n" + text + "</dl>\n";
 }
 
 /// As papers have it: a group of bars for each scene, and one of the geometric means.
@@ -89,8 +117,8 @@ std::string effect_plot(const SweepFindings& findings, const AxisEffect& effect)
                                         value.least, value.most, value.points);
     plot.groups.push_back({value.value, {{0, value.mean, bar_color, tip}}, {value.least, value.most}});
   }
-  return fmt::format("<h3>{}: {:.2f}x</h3>\n", html_escaped(findings.result.study.axes[effect.axis].name),
-                     effect.ratio) +
+  return fmt::format("<h3>{}: {}</h3>\n", html_escaped(findings.result.study.axes[effect.axis].name),
+                     effect_words(findings, effect)) +
          figure("by " + findings.result.study.axes[effect.axis].name, plot);
 }
 
@@ -157,17 +185,18 @@ std::string points_section(const SweepFindings& findings) {
 
 std::string sweep_page(const SweepFindings& findings) {
   const Study& study = findings.result.study;
-  std::string text = page_head("vrpipe sweep") + "<h1>A study</h1>\n";
-  text += fmt::format("<p class=\"verdict\">{} points", study.points.size());
-  if (study.seed) text += fmt::format(", a sample of {} (seed {})", study.product, *study.seed);
-  text += "</p>\n<ul>\n";
+  const std::string title = std::filesystem::path(findings.result.provenance.config).filename().string();
+  std::string text = page_head("vrpipe sweep: " + title, facts_style) + "<h1>" + html_escaped(title) + "</h1>\n";
+  text +=
+      "<p class=\"verdict\">" + html_escaped(points_line(study)) + "</p>\n" + facts(findings.result, findings.scene);
+  text += "<h2>What varies</h2>\n<ul>\n";
   for (const StudyAxis& axis : study.axes) {
     std::string values;
     for (const std::string& value : axis.values) values += (values.empty() ? "" : ", ") + value;
     text += "<li><b>" + html_escaped(axis.name) + "</b>: " + html_escaped(values) + "</li>\n";
   }
   text += "</ul>\n";
-  if (const std::string reference = reference_text(study); !reference.empty())
+  if (const std::string reference = reference_text(study); !reference.empty() && has_speedups(findings.table))
     text += "<p class=\"subtle\">Speed-ups are over the point with " + html_escaped(reference) +
             ", of the same scene, view and fidelity.</p>\n";
   text += grouped_section(findings) + effects_section(findings) + pareto_section(findings) + points_section(findings);

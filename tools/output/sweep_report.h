@@ -13,6 +13,8 @@ struct SweepFindings {
   const SweepResult& result;
   SweepTable table;
   AxisEffects effects;
+  std::vector<IdleAxis> idle;
+  CommonScene scene;
   std::optional<GroupedMeans> grouped;
   std::optional<ParetoTable> pareto;
 };
@@ -27,8 +29,16 @@ std::string sweep_csv(const SweepTable& table);
 std::string sweep_jsonl(const SweepTable& table);
 /// Schema vrpipe.sweep/1.
 Json sweep_json(const SweepFindings& findings);
-/// What speed-ups are over, in words; empty where there are none.
+/// What speed-ups are over, in words; empty if no axis says it.
 std::string reference_text(const Study& study);
+/// How many points there are, and of how many combinations.
+std::string points_line(const Study& study);
+/// Scene and size, as far as all points have the same; else empty.
+std::string scene_line(const CommonScene& scene);
+/// Of an axis, what it changes, in words: "1.24x", or "no effect".
+std::string effect_words(const SweepFindings& findings, const AxisEffect& effect);
+/// Whether any point has a speed-up.
+bool has_speedups(const SweepTable& table);
 /// A page that needs no network.
 std::string sweep_page(const SweepFindings& findings);
 
