@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "elaboration/untimed_gpu.h"
 
 #include <vrpipe/arithmetic/random.h>
@@ -76,11 +78,18 @@ std::uint64_t retired(const Counts& counts) {
          counts.quads_blended;
 }
 
-/// Of a splat, about: of its box, and half of those along its edges.
-double estimated_quads(const Splat& splat) {
+/// The share of a range around a centre that is from 0 to `size`.
+double share_on_screen(double center, double extent, double size) {
+  return std::max(0.0, std::min(center + extent, size) - std::max(center - extent, 0.0)) / std::max(2 * extent, 1e-9);
+}
+
+/// Of a splat, about: those in its box and half of those that its edges cross, where they are on the screen.
+double estimated_quads(const Splat& splat, const Frame& frame) {
   const double across = std::sqrt(double{splat.ax} * splat.ax + double{splat.ay} * splat.ay);
   const double along = std::sqrt(double{splat.bx} * splat.bx + double{splat.by} * splat.by);
-  return across * along + 2 * (across + along) + 1;
+  return (across * along + across + along + 1) *
+         share_on_screen(splat.cx, std::fabs(splat.ax) + std::fabs(splat.bx), frame.width()) *
+         share_on_screen(splat.cy, std::fabs(splat.ay) + std::fabs(splat.by), frame.height());
 }
 
 }  // namespace
@@ -135,8 +144,13 @@ std::optional<UserError> FrameSampler::obstacle(const RunRequest& request) {
     return refuse(std::string("fidelity ") + name_of(request.fidelity), "windows are simulated at cycle", "use cycle");
   }
   if (gpcs_of(request) > 1) {
-    return refuse("platform " + request.platform->name, "windows are of one GPC: several do not come as far side by side",
+    return refuse("platform " + request.platform->name,
+                  "windows are of one GPC: several do not come as far side by side",
                   "use lt or cycle, or platform.gpcs=1");
+  }
+  if (request.sampling && request.sampling->windows != 0 && request.sampling->windows < fewest_windows) {
+    return refuse(fmt::format("{} windows", request.sampling->windows), "they say too little of what is between them",
+                  fmt::format("take {} at least", fewest_windows));
   }
   if (request.stop_at > 0) return refuse("--until", "no cycle is known by its number", "use cycle");
   return std::nullopt;
@@ -158,16 +172,15 @@ std::optional<UserError> FrameSampler::obstacle(const Frame& frame) {
 std::uint64_t FrameSampler::usual_windows(const RunRequest& request) { return terminates(request) ? 40 : 24; }
 
 std::optional<std::uint64_t> FrameSampler::windows_for(const RunRequest& request, double error_percent) {
-  const double random_percent =
-      error_percent - (terminates(request) ? bias_percent_of_termination : bias_percent);
+  const double random_percent = error_percent - (terminates(request) ? bias_percent_of_termination : bias_percent);
   if (random_percent <= 0) return std::nullopt;
   const double root = (terminates(request) ? spread_percent_of_termination : spread_percent) / random_percent;
   // More than there are in any frame are as good as all of these.
   return std::max(fewest_windows, static_cast<std::uint64_t>(std::min(std::ceil(root * root), 1e6)));
 }
 
-std::uint64_t FrameSampler::more_windows(const RunRequest& request, std::uint64_t windows,
-                                         double half_interval_percent, double error_percent) {
+std::uint64_t FrameSampler::more_windows(const RunRequest& request, std::uint64_t windows, double half_interval_percent,
+                                         double error_percent) {
   const double bias = terminates(request) ? bias_percent_of_termination : bias_percent;
   // A fifth more, since what they say of their spread is spread as well.
   const double times = 1.2 * std::pow((half_interval_percent - bias) / (error_percent - bias), 2);
@@ -183,14 +196,16 @@ FrameSampler::FrameSampler(const RunRequest& request, const Frame& frame)
   request_.reads_statistics = false;
   std::vector<double> before{0};  // quads, by splat
   for (std::uint32_t i = 0; i < frame.splats(); ++i)
-    before.push_back(before.back() + estimated_quads(frame.draws().front().splat(i)));
+    before.push_back(before.back() + estimated_quads(frame.draws().front().splat(i), frame));
   estimated_quads_ = before.back();
   const auto splat_at = [&](double quads) {
-    const auto splat = static_cast<std::uint32_t>(std::lower_bound(before.begin(), before.end(), quads) - before.begin());
+    const auto splat =
+        static_cast<std::uint32_t>(std::lower_bound(before.begin(), before.end(), quads) - before.begin());
     return std::min(splat, frame.splats()) / splats_per_vertex_warp * splats_per_vertex_warp;
   };
   const double begin = measured_quads;
-  const double end = std::max(begin, estimated_quads_ - 3 * measured_quads);
+  // The estimate may be a third too high without a window that reaches beyond the frame.
+  const double end = std::max(begin, 0.97 * estimated_quads_ - 4 * measured_quads);
   const std::uint64_t strata = request.sampling->windows != 0 ? request.sampling->windows : usual_windows(request);
   const double length = (end - begin) / static_cast<double>(strata);
   windows_.push_back({0, splat_at(begin)});
@@ -273,6 +288,7 @@ FrameSampler::Measured FrameSampler::measure(const Frame& part, double from, boo
     const auto end = static_cast<double>(gpu.run(nullptr));
     if (from > 0) measured.cycle_from = (in_from.cycle() + out_from.cycle()) / 2;
     measured.cycle_to = to_end ? end : (in_to.cycle() + out_to.cycle()) / 2;
+    is_whole_ = is_whole_ && out_from.has_been() && (to_end || out_to.has_been());
   }
   fresh_simulation();
   return measured;
@@ -357,7 +373,8 @@ SampledWork FrameSampler::work_between(double from, double to) const {
   return work;
 }
 
-FrameSampler::Result FrameSampler::result() const {
+std::optional<FrameSampler::Result> FrameSampler::result() const {
+  if (!is_whole_) return std::nullopt;
   const Window& head = windows_.front();
   const Window& tail = windows_.back();
   std::vector<SampledStratum> strata;

@@ -75,8 +75,8 @@ class FrameSampler {
     std::uint64_t cycles = 0;
     SamplingReport report;
   };
-  /// Then.
-  Result result() const;
+  /// Then; none if the frame ended before a window did.
+  std::optional<Result> result() const;
 
  private:
   /// The course of the frame without time.
@@ -117,6 +117,7 @@ class FrameSampler {
   std::vector<Step> steps_;
   std::vector<std::pair<std::uint64_t, std::uint64_t>> primitives_;  ///< issued before a window and its end, by window
   Framebuffer own_;
+  bool is_whole_ = true;               ///< every window was in the frame
   double measured_ = 0, warm_up_ = 0;  ///< cycles
 };
 

@@ -80,10 +80,12 @@ void choose_fidelity(RunRequest& request, const std::string& text) {
   const std::vector<std::string> names = fidelity_names();
   if (std::find(names.begin(), names.end(), words.front()) == names.end()) {
     throw UserError("unknown fidelity '" + words.front() + "'", "--fidelity", "this build has no such fidelity",
-                    fmt::format("did you mean {}? There are {}", nearest_name(words.front(), names), fmt::join(names, ", ")));
+                    fmt::format("did you mean {}? There are {}", nearest_name(words.front(), names),
+                                fmt::join(names, ", ")));
   }
   if (words.front() == sampled_name)
-    throw UserError("unknown fidelity '" + text + "'", "--fidelity", "a sampled run has no units at another fidelity", "write sampled alone");
+    throw UserError("unknown fidelity '" + text + "'", "--fidelity", "a sampled run has no units at another fidelity",
+                    "write sampled alone");
   request.fidelity = fidelity_named(words.front());
   for (auto word = words.begin() + 1; word != words.end(); ++word) {
     const std::size_t sign = word->find('=');
@@ -616,6 +618,23 @@ RunResult simulate_pipeline(const RunRequest& request, const Frame& frame, std::
   return result;
 }
 
+/// What runs took of which nothing is reported.
+class HostTime {
+ public:
+  HostTime& operator+=(const RunResult& result) {
+    host_seconds_ += result.host_seconds;
+    cpu_seconds_ += result.cpu_seconds;
+    return *this;
+  }
+  void add_to(RunResult& result) const {
+    result.host_seconds += host_seconds_;
+    result.cpu_seconds += cpu_seconds_;
+  }
+
+ private:
+  double host_seconds_ = 0, cpu_seconds_ = 0;
+};
+
 /// All at `cycle`.
 RunResult simulate_whole(RunRequest request, const Frame& frame, std::atomic<float>* progress) {
   request.fidelity = Fidelity::cycle;
@@ -625,20 +644,25 @@ RunResult simulate_whole(RunRequest request, const Frame& frame, std::atomic<flo
 }
 
 /// @param request  that can be sampled, as the frame can
-RunResult simulate_windows(const RunRequest& request, const Frame& frame, FrameSampler& sampler,
-                           std::atomic<float>* progress) {
+/// Adds to `in_vain` what it took if nothing came of it.
+std::optional<RunResult> simulate_windows(const RunRequest& request, const Frame& frame, FrameSampler& sampler,
+                                          std::atomic<float>* progress, HostTime& in_vain) {
   RunRequest functional = request;
   functional.fidelity = Fidelity::functional;
   functional.sampling.reset();
   functional.effects.with.emplace_back("l2.contents");
   RunResult result = simulate_pipeline(functional, frame, progress, &sampler);
+  const std::optional<FrameSampler::Result> sampled = sampler.result();
+  if (!sampled) {
+    in_vain += result;
+    return std::nullopt;
+  }
   result.request = request;
-  const FrameSampler::Result sampled = sampler.result();
-  result.sampling = sampled.report;
+  result.sampling = sampled->report;
   result.sampling->seed = request.sampling->seed;
-  result.cycles = sampled.cycles;
-  result.milliseconds = static_cast<double>(sampled.cycles) / (request.platform->frequency_mhz * 1e3);
-  result.expected_error_percent = sampled.report.half_interval_percent;
+  result.cycles = sampled->cycles;
+  result.milliseconds = static_cast<double>(sampled->cycles) / (request.platform->frequency_mhz * 1e3);
+  result.expected_error_percent = sampled->report.half_interval_percent;
   result.result_hash = hash_of(result);
   return result;
 }
@@ -648,8 +672,12 @@ RunResult simulate_sampled(const RunRequest& request, const Frame& frame, std::a
   check_may_sample(request);
   if (const auto obstacle = FrameSampler::obstacle(frame)) throw *obstacle;
   FrameSampler sampler(request, frame);
-  if (sampler.is_worth_while()) return simulate_windows(request, frame, sampler, progress);
+  HostTime in_vain;
+  if (sampler.is_worth_while()) {
+    if (auto result = simulate_windows(request, frame, sampler, progress, in_vain)) return std::move(*result);
+  }
   RunResult result = simulate_whole(request, frame, progress);
+  in_vain.add_to(result);
   result.request = request;
   result.sampling.emplace();
   result.sampling->seed = request.sampling->seed;
@@ -669,23 +697,16 @@ class WayWithin {
       result = simulate_whole(request_, frame_, progress_);
       took(*result, "all at cycle");
     }
-    result->host_seconds = host_seconds_;
-    result->cpu_seconds = cpu_seconds_;
+    in_vain_.add_to(*result);
     return std::move(*result);
   }
 
  private:
   void took(RunResult& result, const std::string& why) {
-    count(result);
     because_.push_back(why);
     result.way = WayReport{fidelity_of(result.request), fmt::format("{}", fmt::join(because_, "; "))};
     result.request = as_taken(request_, result.way);
   }
-  void count(const RunResult& result) {
-    host_seconds_ += result.host_seconds;
-    cpu_seconds_ += result.cpu_seconds;
-  }
-
   std::optional<RunResult> by_lt() {
     const double least = expected_error_percent(1);
     if (request_.error_percent < least) {
@@ -707,7 +728,7 @@ class WayWithin {
       return result;
     }
     because_.push_back(says);
-    count(result);
+    in_vain_ += result;
     return std::nullopt;
   }
 
@@ -729,15 +750,19 @@ class WayWithin {
         because_.push_back(fmt::format("the {} windows that takes are half of the frame", *windows));
         break;
       }
-      RunResult result = simulate_windows(sampled, frame_, sampler, progress_);
-      const double half = result.sampling->half_interval_percent;
+      std::optional<RunResult> result = simulate_windows(sampled, frame_, sampler, progress_, in_vain_);
+      if (!result) {
+        because_.emplace_back("the frame ended before its windows");
+        break;
+      }
+      const double half = result->sampling->half_interval_percent;
       const std::string are = fmt::format("{} windows are within {:.1f} %", *windows, half);
       if (half <= request_.error_percent) {
-        took(result, are);
+        took(*result, are);
         return result;
       }
       because_.push_back(are);
-      count(result);
+      in_vain_ += *result;
       windows = FrameSampler::more_windows(sampled, *windows, half, request_.error_percent);
     }
     return std::nullopt;
@@ -747,7 +772,7 @@ class WayWithin {
   const Frame& frame_;
   std::atomic<float>* const progress_;
   std::vector<std::string> because_;
-  double host_seconds_ = 0, cpu_seconds_ = 0;
+  HostTime in_vain_;
 };
 
 /// Throws UserError.
@@ -759,7 +784,8 @@ void check_error(const RunRequest& request) {
   if (!(request.error_percent > 0 && request.error_percent <= 100))
     refuse("--error", fmt::format("{:g} % is not above 0 and up to 100", request.error_percent), "ask for 1%");
   if (!request.variant.is_of_pipeline())
-    refuse("variant " + request.variant.name, "what is drawn outside the pipeline is at one fidelity", "use --fidelity");
+    refuse("variant " + request.variant.name, "what is drawn outside the pipeline is at one fidelity",
+           "use --fidelity");
   if (request.stop_at > 0 || request.observers != nullptr)
     refuse("--until, --html, --heat-maps", "some ways have no course, and several may be tried", "use --fidelity");
 }

@@ -48,9 +48,8 @@ void check_has_time(const SimulationJob& job, const std::string& option) {
   }
   throw UserError("cannot use option", option,
                   "fidelity " + fidelity_of(request) +
-                      (request.fidelity == Fidelity::functional
-                           ? " has no time"
-                           : " knows how long a run takes, but not what is when"),
+                      (request.fidelity == Fidelity::functional ? " has no time"
+                                                                : " knows how long a run takes, but not what is when"),
                   "use lt or cycle");
 }
 

@@ -65,7 +65,8 @@ VRPIPE_MEMBERS(WayReport, fidelity, why)
 VRPIPE_MEMBERS(SamplingReport, windows, seed, measured_share, warm_up_share, half_interval_percent)
 VRPIPE_MEMBERS(RunResult, request, cycles, stopped, milliseconds, host_seconds, cpu_seconds, counts, utilization, units,
                bottleneck, kernels, statistics, implementations, parameters, outside_validated_range,
-               expected_error_percent, effects, sampling, way, result_hash, kernel_events, framebuffer, draws, intervals)
+               expected_error_percent, effects, sampling, way, result_hash, kernel_events, framebuffer, draws,
+               intervals)
 
 /// Types of members that stay behind.
 template <class Member>

@@ -43,7 +43,8 @@ std::vector<std::unique_ptr<HeatMaps>> observe_heat(std::vector<RunRequest>& req
   for (RunRequest& request : requests) {
     if (request.observers == nullptr) request.observers = std::make_shared<Observers>();
     // Of a run in windows, what is seen has no time.
-    maps.push_back(std::make_unique<HeatMaps>(width, height, request.sampling ? Fidelity::functional : request.fidelity));
+    maps.push_back(
+        std::make_unique<HeatMaps>(width, height, request.sampling ? Fidelity::functional : request.fidelity));
     // An accelerator does not tell; its maps stay black.
     if (request.variant.drawn_by != DrawnBy::accelerator)
       maps.back()->attach(*request.observers, request.variant.early_termination);

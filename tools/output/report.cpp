@@ -401,7 +401,8 @@ std::string sampling_text(const std::vector<RunResult>& runs) {
       continue;
     }
     text += fmt::format(
-        "{}sampled: {} cycles, {:g} of 100 within +-{:.1f} %, {} windows with {:.1f} % of them and {:.1f} % to warm up, "
+        "{}sampled: {} cycles, {:g} of 100 within +-{:.1f} %, {} windows with {:.1f} % of them and {:.1f} % to warm "
+        "up, "
         "seed {}\n",
         name, grouped(*run.cycles), SamplingReport::confidence_percent, sampling.half_interval_percent,
         sampling.windows, 100 * sampling.measured_share, 100 * sampling.warm_up_share, sampling.seed);
@@ -526,8 +527,8 @@ std::vector<std::string> notes_of(const JobResult& result) {
   if (draws_nothing(result.runs.front(), result.scene)) {
     text += nothing_visible(result.scene, result.viewpoint.has_value()) + "\n";
   }
-  text += anomaly_text(result.runs) + sampling_text(result.runs) + expected_error_text(result.runs) + validated_text(result.runs) +
-          rejected_text(result.scene.rejected);
+  text += anomaly_text(result.runs) + sampling_text(result.runs) + expected_error_text(result.runs) +
+          validated_text(result.runs) + rejected_text(result.scene.rejected);
   for (const std::string& note : result.scene.notes) text += "note: " + note + "\n";
   text += storage_text(result.runs);
   std::vector<std::string> lines;
