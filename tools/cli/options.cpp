@@ -313,16 +313,17 @@ void declare_units(Arguments& arguments, Values& units, Values& plugins) {
 }
 
 void SimulationArguments::declare_fidelity(Arguments& arguments) {
-  arguments
-      .add_option("--fidelity", fidelity_, "NAME",
-                  "how exact time is, from images and counts alone to every unit in every\n"
-                  "cycle: " +
-                      either_of(fidelity_names()) +
-                      " (default: cycle);\n"
-                      "lt,UNIT=cycle,... has some units in every cycle among others at lt; sampled\n"
-                      "has windows of the frame at cycle, and an interval (docs/accuracy.md)",
-                  rules_group)
-      .default_text = vrpipe::name_of(Fidelity::cycle);
+  Option& fidelity =
+      arguments.add_option("--fidelity", fidelity_, "NAME",
+                           "how exact time is, from images and counts alone to every unit in every\n"
+                           "cycle: " +
+                               either_of(fidelity_names()) +
+                               " (default: cycle);\n"
+                               "lt,UNIT=cycle,... has some units in every cycle among others at lt; sampled\n"
+                               "has windows of the frame at cycle, and an interval (docs/accuracy.md)",
+                           rules_group);
+  fidelity.default_text = vrpipe::name_of(Fidelity::cycle);
+  fidelity.default_unless = "--error";
 }
 
 void SimulationArguments::declare_error(Arguments& arguments) {
