@@ -357,4 +357,17 @@ void SectoredCache::find_conflicts(std::uint32_t missed_by_shadow) {
   missed_sectors_ = first_time_ = 0;
 }
 
+void SectoredCache::hold_as(const SectoredCache& other) {
+  lines_ = other.lines_;
+  for (Entry& entry : lines_) {
+    if (entry.were_there != nullptr) entry.were_there = details_ ? &were_there_.of(entry.tag) : everything_.data();
+  }
+  sets_ = other.sets_;
+  chains_ = other.chains_;
+  kept_ = other.kept_;
+  byte_masks_ = other.byte_masks_;
+  held_ = other.held_;
+  evictions_ = other.evictions_;
+}
+
 }  // namespace vrpipe

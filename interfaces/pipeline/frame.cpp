@@ -157,6 +157,25 @@ void Frame::add(const Command& command) {
   commands_.push_back(command);
 }
 
+Frame Frame::part(std::uint32_t first, std::uint32_t end) const {
+  Frame part(width_, height_);
+  part.depth_format_ = depth_format_;
+  part.splats_ = first;
+  std::uint32_t passed = 0;  // of all splats
+  for (const Command& command : commands_) {
+    if (!command.is_draw) {
+      if (first < passed && passed < end) part.clear(command.clear);
+      continue;
+    }
+    const DrawCall& call = draws_[command.draw];
+    const std::uint32_t from = std::max(first, call.base);
+    const std::uint32_t to = std::min(end, call.base + call.splats);
+    passed = call.base + call.splats;
+    if (from < to) part.draw(call.geometry, call.state, call.name, call.first + (from - call.base), to - from);
+  }
+  return part;
+}
+
 void Frame::change_states(const std::function<void(DrawState&)>& change) {
   for (DrawCall& call : draws_) change(call.state);
   for (Command& command : commands_) {

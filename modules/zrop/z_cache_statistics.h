@@ -20,8 +20,17 @@ struct ZCacheStatistics : SectoredCacheStatistics {
 inline std::optional<ClearedSectors> cleared_sectors_of(const DepthStencilSurface& surface, const ZCache& cache,
                                                         ZCacheStatistics& statistics) {
   if (!cache.fast_clear || surface.is_preset()) return std::nullopt;
-  return std::optional<ClearedSectors>(std::in_place, surface.address(std::size_t{0}), surface.size_bytes(),
-                                       cache.organization, statistics.sectors_as_cleared);
+  const CacheOrganization& organization = cache.organization;
+  std::optional<ClearedSectors> cleared(std::in_place, surface.address(std::size_t{0}), surface.size_bytes(),
+                                        organization, statistics.sectors_as_cleared);
+  if (!surface.goes_on()) return cleared;
+  for (std::size_t place = 0; place < surface.grid().quads(); ++place) {
+    if (surface.is_as_cleared(place)) continue;
+    const std::uint64_t address = surface.address(place);
+    const std::uint64_t in_line = address % organization.line_bytes;
+    cleared->written(address - in_line, 1U << (in_line / organization.sector_bytes));
+  }
+  return cleared;
 }
 
 }  // namespace vrpipe

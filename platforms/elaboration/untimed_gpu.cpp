@@ -67,10 +67,11 @@ UntimedUnit* UntimedGpu::of_slot(const std::string& slot, unsigned gpc) const {
   return nullptr;
 }
 
-void UntimedGpu::run(std::atomic<float>* progress) {
+void UntimedGpu::run(std::atomic<float>* progress, const std::function<void()>& passed) {
   const auto splats = static_cast<float>(std::max<std::uint32_t>(configuration_.frame().splats(), 1));
   for (const Placed& placed : units_) {
     for (std::uint64_t pieces = 1; placed.unit->run_piece(); ++pieces) {
+      if (passed) passed();
       if (progress != nullptr && pieces % 128 == 0) {
         *progress = std::min(1.0F, static_cast<float>(pieces * splats_per_vertex_warp) / splats);
       }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -35,8 +36,8 @@ class UntimedGpu {
   /// A slot's unit in a GPC; in a slot of the front end it serves all. Null for none.
   UntimedUnit* of_slot(const std::string& slot, unsigned gpc) const;
 
-  /// `progress`, if given, goes from 0 to 1.
-  void run(std::atomic<float>* progress);
+  /// `progress`, if given, goes from 0 to 1. `passed`, if given, is called after each vertex warp.
+  void run(std::atomic<float>* progress, const std::function<void()>& passed = {});
 
  private:
   void add_memories();

@@ -1,11 +1,13 @@
 #include <vrpipe/platforms/simulation.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <optional>
 
 #include "bound/work_counter.h"
 #include "elaboration/untimed_gpu.h"
+#include "run/frame_sampler.h"
 #include "run/host_timer.h"
 #include "run/outside_pipeline.h"
 #include "run/result_hash.h"
@@ -39,6 +41,10 @@ const char* name_of(Fidelity fidelity) {
   return "";
 }
 
+namespace {
+constexpr const char* sampled_name = "sampled";
+}  // namespace
+
 const std::vector<Fidelity>& fidelities() {
   static const std::vector<Fidelity> all{Fidelity::functional, Fidelity::bound, Fidelity::lt, Fidelity::cycle};
   return all;
@@ -54,11 +60,32 @@ Fidelity fidelity_named(const std::string& name) {
                   suggestion(name, names));
 }
 
+std::vector<std::string> fidelity_names() {
+  std::vector<std::string> names;
+  for (const Fidelity fidelity : fidelities()) names.emplace_back(name_of(fidelity));
+  names.emplace_back(sampled_name);
+  return names;
+}
+
 void choose_fidelity(RunRequest& request, const std::string& text) {
   std::vector<std::string> words;
   boost::split(words, text, boost::is_any_of(","));
-  request.fidelity = fidelity_named(words.front());
   request.units_at_cycle.clear();
+  request.sampling.reset();
+  if (text == sampled_name) {
+    request.fidelity = Fidelity::cycle;
+    request.sampling.emplace();
+    return;
+  }
+  const std::vector<std::string> names = fidelity_names();
+  if (std::find(names.begin(), names.end(), words.front()) == names.end()) {
+    throw UserError("unknown fidelity '" + words.front() + "'", "--fidelity", "this build has no such fidelity",
+                    suggestion(words.front(), names));
+  }
+  if (words.front() == sampled_name)
+    throw UserError("unknown fidelity '" + text + "'", "--fidelity", "a sampled run has no units at another fidelity",
+                    "write sampled alone");
+  request.fidelity = fidelity_named(words.front());
   for (auto word = words.begin() + 1; word != words.end(); ++word) {
     const std::size_t sign = word->find('=');
     if (request.fidelity != Fidelity::lt || sign == std::string::npos || word->substr(sign + 1) != "cycle") {
@@ -69,7 +96,17 @@ void choose_fidelity(RunRequest& request, const std::string& text) {
   }
 }
 
+RunRequest as_taken(const RunRequest& request, const std::optional<WayReport>& way) {
+  RunRequest taken = request;
+  if (!way) return taken;
+  const Sampling asked = request.sampling.value_or(Sampling());
+  choose_fidelity(taken, way->fidelity);
+  if (taken.sampling) taken.sampling->seed = asked.seed;
+  return taken;
+}
+
 std::string fidelity_of(const RunRequest& request) {
+  if (request.sampling) return sampled_name;
   std::string text = name_of(request.fidelity);
   if (request.fidelity != Fidelity::lt || !request.variant.is_of_pipeline()) return text;
   for (const std::string& unit : request.units_at_cycle) text += "," + unit + "=cycle";
@@ -204,6 +241,11 @@ bool samples_statistics(const RunRequest& request) {
   return request.observers != nullptr && !request.observers->of_statistics().empty();
 }
 
+/// Throws UserError.
+void check_may_sample(const RunRequest& request) {
+  if (const auto obstacle = FrameSampler::obstacle(request)) throw *obstacle;
+}
+
 void check_may_stop(const RunRequest& request) {
   if (request.stop_at == 0 || request.fidelity == Fidelity::cycle) return;
   throw UserError("cannot stop at a cycle", std::string("fidelity ") + name_of(request.fidelity),
@@ -211,10 +253,11 @@ void check_may_stop(const RunRequest& request) {
 }
 
 void check_sampling_has_time(const RunRequest& request) {
-  if (!samples_statistics(request) || has_time(request.fidelity)) return;
-  throw UserError("cannot sample statistics", std::string("--fidelity ") + name_of(request.fidelity),
-                  request.fidelity == Fidelity::bound ? "its cycles follow from all the work, no work has a cycle"
-                                                      : "it has no time",
+  if (!samples_statistics(request) || (has_time(request.fidelity) && !request.sampling)) return;
+  throw UserError("cannot sample statistics", "--fidelity " + fidelity_of(request),
+                  request.sampling                      ? "most of its course has no time"
+                  : request.fidelity == Fidelity::bound ? "its cycles follow from all the work, no work has a cycle"
+                                                        : "it has no time",
                   "use lt or cycle");
 }
 
@@ -493,7 +536,9 @@ void report_bound(const Configuration& configuration, const UntimedGpu& gpu, con
 }
 
 /// Without time, or with the bound that follows from the work.
-void run_untimed(const Configuration& configuration, std::atomic<float>* progress, RunResult& result) {
+/// @param sampler  of its time; or null
+void run_untimed(const Configuration& configuration, std::atomic<float>* progress, RunResult& result,
+                 FrameSampler* sampler) {
   UntimedGpu gpu(configuration, result.framebuffer);
   std::vector<PhaseBound> bounds;
   std::vector<std::unique_ptr<WorkCounter>> counters;
@@ -507,7 +552,13 @@ void run_untimed(const Configuration& configuration, std::atomic<float>* progres
     }
   }
   const HostTimer timer;
-  gpu.run(progress);
+  if (sampler == nullptr) {
+    gpu.run(progress);
+  } else {
+    sampler->begin(gpu, result.framebuffer);
+    gpu.run(progress, [sampler] { sampler->passed(); });
+    sampler->end();
+  }
   for (const auto& counter : counters) counter->end_phase();
   timer.stop(result);
 
@@ -536,7 +587,8 @@ double expected_error_percent(double occupancy) {
   return 0.2 + 2 * undecided / (undecided + 0.1);
 }
 
-RunResult simulate_pipeline(const RunRequest& request, const Frame& frame, std::atomic<float>* progress) {
+RunResult simulate_pipeline(const RunRequest& request, const Frame& frame, std::atomic<float>* progress,
+                            FrameSampler* sampler = nullptr) {
   check_sampling_has_time(request);
   check_may_stop(request);
   const Configuration configuration(request, frame);
@@ -557,11 +609,183 @@ RunResult simulate_pipeline(const RunRequest& request, const Frame& frame, std::
     if (request.fidelity == Fidelity::lt && result.bottleneck && result.outside_validated_range.empty())
       result.expected_error_percent = expected_error_percent(result.bottleneck->occupancy);
   } else {
-    run_untimed(configuration, progress, result);
+    run_untimed(configuration, progress, result, sampler);
   }
   result.effects = configuration.effects();
   result.result_hash = hash_of(result);
   return result;
+}
+
+/// What runs took of which nothing is reported.
+class HostTime {
+ public:
+  HostTime& operator+=(const RunResult& result) {
+    host_seconds_ += result.host_seconds;
+    cpu_seconds_ += result.cpu_seconds;
+    return *this;
+  }
+  void add_to(RunResult& result) const {
+    result.host_seconds += host_seconds_;
+    result.cpu_seconds += cpu_seconds_;
+  }
+
+ private:
+  double host_seconds_ = 0, cpu_seconds_ = 0;
+};
+
+/// All at `cycle`.
+RunResult simulate_whole(RunRequest request, const Frame& frame, std::atomic<float>* progress) {
+  request.fidelity = Fidelity::cycle;
+  request.units_at_cycle.clear();
+  request.sampling.reset();
+  return simulate_pipeline(request, frame, progress);
+}
+
+/// @param request  that can be sampled, as the frame can
+/// Adds to `in_vain` what it took if nothing came of it.
+std::optional<RunResult> simulate_windows(const RunRequest& request, const Frame& frame, FrameSampler& sampler,
+                                          std::atomic<float>* progress, HostTime& in_vain) {
+  RunRequest functional = request;
+  functional.fidelity = Fidelity::functional;
+  functional.sampling.reset();
+  functional.effects.with.emplace_back("l2.contents");
+  RunResult result = simulate_pipeline(functional, frame, progress, &sampler);
+  const std::optional<FrameSampler::Result> sampled = sampler.result();
+  if (!sampled) {
+    in_vain += result;
+    return std::nullopt;
+  }
+  result.request = request;
+  result.sampling = sampled->report;
+  result.sampling->seed = request.sampling->seed;
+  result.cycles = sampled->cycles;
+  result.milliseconds = static_cast<double>(sampled->cycles) / (request.platform->frequency_mhz * 1e3);
+  result.expected_error_percent = sampled->report.half_interval_percent;
+  result.result_hash = hash_of(result);
+  return result;
+}
+
+RunResult simulate_sampled(const RunRequest& request, const Frame& frame, std::atomic<float>* progress) {
+  check_sampling_has_time(request);
+  check_may_sample(request);
+  if (const auto obstacle = FrameSampler::obstacle(frame)) throw *obstacle;
+  FrameSampler sampler(request, frame);
+  HostTime in_vain;
+  if (sampler.is_worth_while()) {
+    if (auto result = simulate_windows(request, frame, sampler, progress, in_vain)) return std::move(*result);
+  }
+  RunResult result = simulate_whole(request, frame, progress);
+  in_vain.add_to(result);
+  result.request = request;
+  result.sampling.emplace();
+  result.sampling->seed = request.sampling->seed;
+  return result;
+}
+
+/// The cheapest way to cycles within RunRequest::error_percent. What a way took that did not get there counts as well.
+class WayWithin {
+ public:
+  WayWithin(const RunRequest& request, const Frame& frame, std::atomic<float>* progress)
+      : request_(request), frame_(frame), progress_(progress) {}
+
+  RunResult go() {
+    std::optional<RunResult> result = by_lt();
+    if (!result) result = by_windows();
+    if (!result) {
+      result = simulate_whole(request_, frame_, progress_);
+      took(*result, "all at cycle");
+    }
+    in_vain_.add_to(*result);
+    return std::move(*result);
+  }
+
+ private:
+  void took(RunResult& result, const std::string& why) {
+    because_.push_back(why);
+    result.way = WayReport{fidelity_of(result.request), fmt::format("{}", fmt::join(because_, "; "))};
+    result.request = as_taken(request_, result.way);
+  }
+  std::optional<RunResult> by_lt() {
+    const double least = expected_error_percent(1);
+    if (request_.error_percent < least) {
+      because_.push_back(fmt::format("lt never says less than {:.1f} %", least));
+      return std::nullopt;
+    }
+    RunRequest lt = request_;
+    lt.fidelity = Fidelity::lt;
+    lt.units_at_cycle.clear();
+    lt.sampling.reset();
+    fresh_simulation();
+    RunResult result = simulate_pipeline(lt, frame_, progress_);
+    fresh_simulation();
+    const std::string says = result.expected_error_percent
+                                 ? fmt::format("lt says {:.1f} % of itself", *result.expected_error_percent)
+                                 : "lt does not know how far it is off";
+    if (result.expected_error_percent.value_or(INFINITY) <= request_.error_percent) {
+      took(result, says);
+      return result;
+    }
+    because_.push_back(says);
+    in_vain_ += result;
+    return std::nullopt;
+  }
+
+  std::optional<RunResult> by_windows() {
+    RunRequest sampled = request_;
+    sampled.fidelity = Fidelity::cycle;
+    if (!sampled.sampling) sampled.sampling.emplace();
+    if (FrameSampler::obstacle(sampled) || FrameSampler::obstacle(frame_)) {
+      because_.emplace_back("it cannot be sampled");
+      return std::nullopt;
+    }
+    auto windows = FrameSampler::windows_for(sampled, request_.error_percent);
+    if (!windows) because_.emplace_back("windows are never as near");
+    // Spread differs between frames: what the first windows say of it counts.
+    for (unsigned round = 0; windows && round < 2; ++round) {
+      sampled.sampling->windows = *windows;
+      FrameSampler sampler(sampled, frame_);
+      if (!sampler.is_worth_while()) {
+        because_.push_back(fmt::format("the {} windows that takes are half of the frame", *windows));
+        break;
+      }
+      std::optional<RunResult> result = simulate_windows(sampled, frame_, sampler, progress_, in_vain_);
+      if (!result) {
+        because_.emplace_back("the frame ended before its windows");
+        break;
+      }
+      const double half = result->sampling->half_interval_percent;
+      const std::string are = fmt::format("{} windows are within {:.1f} %", *windows, half);
+      if (half <= request_.error_percent) {
+        took(*result, are);
+        return result;
+      }
+      because_.push_back(are);
+      in_vain_ += *result;
+      windows = FrameSampler::more_windows(sampled, *windows, half, request_.error_percent);
+    }
+    return std::nullopt;
+  }
+
+  const RunRequest& request_;
+  const Frame& frame_;
+  std::atomic<float>* const progress_;
+  std::vector<std::string> because_;
+  HostTime in_vain_;
+};
+
+/// Throws UserError.
+void check_error(const RunRequest& request) {
+  if (request.error_percent == 0) return;
+  const auto refuse = [](const std::string& where, const std::string& why, const std::string& remedy) {
+    throw UserError("cannot ask for an error", where, why, remedy);
+  };
+  if (!(request.error_percent > 0 && request.error_percent <= 100))
+    refuse("--error", fmt::format("{:g} % is not above 0 and up to 100", request.error_percent), "ask for 1%");
+  if (!request.variant.is_of_pipeline())
+    refuse("variant " + request.variant.name, "what is drawn outside the pipeline is at one fidelity",
+           "use --fidelity");
+  if (request.stop_at > 0 || request.observers != nullptr)
+    refuse("--until, --html, --heat-maps", "some ways have no course, and several may be tried", "use --fidelity");
 }
 
 }  // namespace
@@ -571,11 +795,22 @@ RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<floa
 }
 
 RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<float>* progress) {
-  RunResult result = request.variant.is_of_pipeline() ? simulate_pipeline(request, frame, progress)
-                                                      : simulate_outside_pipeline(request, frame);
+  check_error(request);
+  const auto by_the_way = [&] {
+    if (request.error_percent > 0) return WayWithin(request, frame, progress).go();
+    if (request.sampling) return simulate_sampled(request, frame, progress);
+    return request.variant.is_of_pipeline() ? simulate_pipeline(request, frame, progress)
+                                            : simulate_outside_pipeline(request, frame);
+  };
+  RunResult result = by_the_way();
   if (!result.stopped) check_conservation(result.counts);
   if (request.observers != nullptr) request.observers->end(result);
   return result;
+}
+
+bool takes_windows(const RunRequest& request, const Frame& frame) {
+  return request.sampling && !FrameSampler::obstacle(request) && !FrameSampler::obstacle(frame) &&
+         FrameSampler(request, frame).is_worth_while();
 }
 
 namespace {
@@ -607,6 +842,8 @@ void check_configuration(const RunRequest& request) {
   empty.set_depth_format(depth_format_of(request));
   check_sampling_has_time(request);
   check_may_stop(request);
+  check_error(request);
+  if (request.sampling && request.error_percent == 0) check_may_sample(request);
   RunRequest of_pipeline = with_all_effects(request);
   if (!request.variant.is_of_pipeline()) {
     check_outside_pipeline(request);

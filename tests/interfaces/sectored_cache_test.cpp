@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <vrpipe/arithmetic/random.h>
 #include <vrpipe/component/error.h>
 
 namespace vrpipe {
@@ -402,6 +403,20 @@ TEST(Sectors, SectorsMoveInTheLongestNaturallyAlignedRuns) {
         const bool taken = i >= first && i < first + count;
         ASSERT_EQ(left >> i & 1U, taken ? 0U : mask >> i & 1U);
       }
+    }
+  }
+}
+
+TEST(SectoredCache, GoesOnAsTheOneWhoseLinesItHolds) {
+  for (const Replacement policy : all_policies) {
+    for (const std::uint32_t ways : {0U, 4U}) {
+      LineReader one(of_lines(64, ways, policy)), other(of_lines(64, ways, policy));
+      const auto line_at = [](std::uint64_t i) { return mix(i) % 100; };
+      for (std::uint64_t i = 0; i < 500; ++i) one.misses(line_at(i));
+      other.misses(3);
+      other.cache.hold_as(one.cache);
+      EXPECT_EQ(other.cache.lines_held(), one.cache.lines_held());
+      for (std::uint64_t i = 500; i < 1500; ++i) EXPECT_EQ(other.misses(line_at(i)), one.misses(line_at(i))) << i;
     }
   }
 }

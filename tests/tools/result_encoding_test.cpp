@@ -68,6 +68,8 @@ RunResult full_result() {
   result.parameters = {{"tc.bins", "32"}, {"state.exponential", "exact"}};
   result.outside_validated_range = {"\xc3", ""};
   result.expected_error_percent = 0.1 + 0.2;
+  result.sampling = SamplingReport{26, huge - 4, 0.1, 0.2, 1.0 / 3};
+  result.way = WayReport{"sampled", "\xe9"};
   result.result_hash = "0123456789abcdef";
   result.kernel_events = 9;
   result.framebuffer.addresses.attributes = {0x10000, 123};
@@ -148,7 +150,23 @@ void expect_equal_intervals(const IntervalReport& actual, const IntervalReport& 
 void expect_equal(const RunResult& actual, const RunResult& expected) {
   const auto& [request, cycles, stopped, milliseconds, host_seconds, cpu_seconds, counts, utilization, units,
                bottleneck, kernels, statistics, implementations, parameters, outside_validated_range,
-               expected_error_percent, effects, result_hash, kernel_events, framebuffer, draws, intervals] = actual;
+               expected_error_percent, effects, sampling, way, result_hash, kernel_events, framebuffer, draws,
+               intervals] = actual;
+  ASSERT_EQ(sampling.has_value(), expected.sampling.has_value());
+  if (sampling) {
+    const auto& [windows, seed, measured_share, warm_up_share, half_interval_percent] = *sampling;
+    EXPECT_EQ(windows, expected.sampling->windows);
+    EXPECT_EQ(seed, expected.sampling->seed);
+    EXPECT_EQ(measured_share, expected.sampling->measured_share);
+    EXPECT_EQ(warm_up_share, expected.sampling->warm_up_share);
+    EXPECT_EQ(half_interval_percent, expected.sampling->half_interval_percent);
+  }
+  ASSERT_EQ(way.has_value(), expected.way.has_value());
+  if (way) {
+    const auto& [fidelity, why] = *way;
+    EXPECT_EQ(fidelity, expected.way->fidelity);
+    EXPECT_EQ(why, expected.way->why);
+  }
   ASSERT_EQ(intervals.has_value(), expected.intervals.has_value());
   if (intervals) expect_equal_intervals(*intervals, *expected.intervals);
   EXPECT_EQ(framebuffer.addresses.attributes.address, expected.framebuffer.addresses.attributes.address);
@@ -300,7 +318,10 @@ TEST(ResultEncoding, TheRequestIsWhatTheReceiverSays) {
   const RunResult result = through_bytes(full_result());
   EXPECT_EQ(result.request.platform, a_request().platform);
   EXPECT_EQ(result.request.variant.name, a_request().variant.name);
-  EXPECT_EQ(result.request.fidelity, a_request().fidelity);
+  EXPECT_EQ(fidelity_of(result.request), "sampled") << "which the run of it chose";
+  RunResult asked = full_result();
+  asked.way.reset();
+  EXPECT_EQ(through_bytes(asked).request.fidelity, a_request().fidelity);
   EXPECT_EQ(result.request.settings.size(), 1U);
 }
 

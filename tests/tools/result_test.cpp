@@ -470,6 +470,8 @@ TEST_F(Result, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
          json_of({"run", "--scene", "tiny.spl", "--fidelity", "functional", "--explain-effects"}),
          json_of({"compare", "--scene", "tiny.spl", "--platform", "desktop", "--energy"}),
          json_of({"run", "--scene", "tiny.spl", "--interval", "100"}),
+         json_of({"run", "--scene", "tiny.spl", "--fidelity", "sampled"}),
+         json_of({"run", "--scene", "tiny.spl", "--error", "3%"}),
          json_of({"run", "--scene", "tiny.spl", "--fidelity", "functional", "--energy"})});
   check("Of `accuracy`",
         {of_scene({"accuracy", "--quick"}), json_of({"accuracy", "--scene", "tiny.spl", "--set", "crop.ways=64"})});

@@ -21,6 +21,7 @@ class CompareCommand : public Command {
   void declare(Arguments& arguments) override {
     arguments_.declare(arguments, SimulationArguments::Variants::all);
     arguments_.declare_comparison(arguments);
+    arguments_.declare_error(arguments);
     arguments_.declare_frames(arguments);
     arguments_.declare_views(arguments);
     arguments_.declare_page(arguments);
@@ -40,6 +41,7 @@ class CompareCommand : public Command {
         "  vrpipe compare --scene point_cloud.ply --camera cameras.json#3 --size 1280x720\n"
         "  vrpipe compare --scene point_cloud.ply --camera cameras.json --views 20 --size 1280x720\n"
         "  vrpipe compare --scene builtin:indoor --views 8 --fidelity lt\n"
+        "  vrpipe compare --scene builtin:train --error 2%\n"
         "  vrpipe compare --platform mobile --format rgba8\n"
         "  vrpipe compare --variant het+qm --variant small=het+qm,tc.bins=16,tgc.bins=64\n"
         "  vrpipe compare --variant baseline --variant software --variant no-end=software,render=endless\n"

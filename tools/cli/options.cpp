@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 #include <iterator>
+#include <limits>
 #include <thread>
 
 #include <fmt/format.h>
@@ -32,11 +33,11 @@ constexpr unsigned usual_passes = 4;  // of the path that has several
 
 const std::string variant_default = "het+qm";
 
-std::string names_of(const std::vector<Fidelity>& fidelities) {
+std::string either_of(const std::vector<std::string>& names) {
   std::string text;
-  for (const Fidelity fidelity : fidelities) {
-    if (!text.empty()) text += fidelity == fidelities.back() ? " or " : ", ";
-    text += vrpipe::name_of(fidelity);
+  for (const std::string& name : names) {
+    if (!text.empty()) text += name == names.back() ? " or " : ", ";
+    text += name;
   }
   return text;
 }
@@ -395,19 +396,43 @@ void declare_units(Arguments& arguments, Values& units, Values& plugins) {
 }
 
 void SimulationArguments::declare_fidelity(Arguments& arguments) {
-  arguments
-      .add_option("--fidelity", fidelity_, "NAME",
-                  "how exact time is, from images and counts alone to every unit in every\n"
-                  "cycle: " +
-                      names_of(fidelities()) +
-                      " (default: cycle);\n"
-                      "lt,UNIT=cycle,... has some units in every cycle among others at lt",
-                  rules_group)
-      .default_text = vrpipe::name_of(Fidelity::cycle);
-  arguments.find("--fidelity")->check = [](const std::string& text) {
+  Option& fidelity =
+      arguments.add_option("--fidelity", fidelity_, "NAME",
+                           "how exact time is, from images and counts alone to every unit in every\n"
+                           "cycle: " +
+                               either_of(fidelity_names()) +
+                               " (default: cycle);\n"
+                               "lt,UNIT=cycle,... has some units in every cycle among others at lt; sampled\n"
+                               "has windows of the frame at cycle, and an interval (docs/accuracy.md)",
+                           rules_group);
+  fidelity.default_text = vrpipe::name_of(Fidelity::cycle);
+  fidelity.default_unless = "--error";
+  fidelity.check = [](const std::string& text) {
     RunRequest request;
     choose_fidelity(request, text);
   };
+}
+
+void SimulationArguments::declare_error(Arguments& arguments) {
+  arguments.add_option("--error", error_, "PERCENT",
+                       "in place of --fidelity: the cheapest way to cycles that are so near, as 1%: lt,\n"
+                       "sampled or cycle",
+                       rules_group);
+  arguments.add_option("--seed", seed_, "N", "of where the windows of a sampled run are (default: 1)", rules_group);
+}
+
+void SimulationArguments::choose_error(RunRequest& request) const {
+  if (const auto text = single(error_, "--error")) {
+    if (!fidelity_.empty())
+      throw UserError("cannot use option", "--error", "--fidelity says which way is taken", "leave out one of them");
+    request.error_percent = parse_percent(*text, "--error");
+    request.sampling.emplace();
+  }
+  if (const auto text = single(seed_, "--seed")) {
+    if (!request.sampling)
+      throw UserError("cannot use option", "--seed", "nothing is drawn at random", "add --fidelity sampled or --error");
+    request.sampling->seed = parse_count(*text, "--seed", std::numeric_limits<std::uint32_t>::max());
+  }
 }
 
 void SimulationArguments::declare_page(Arguments& arguments) {
@@ -704,6 +729,8 @@ MachineJob SimulationArguments::resolve_machine(const Invocation& invocation, co
                     "no scene is preprocessed", "leave it out");
   }
   job.request.variant = variant_named("baseline");
+  if (job.request.sampling)
+    throw UserError("cannot be sampled", "--fidelity", "a microbenchmark is short", "use lt or cycle");
   refuse_unused(job.request, {job.request.variant});
   std::vector<RunRequest> requests{job.request};
   leave_out_restated(requests, of_file(invocation));
@@ -723,6 +750,7 @@ RunRequest SimulationArguments::machine(SettingsByPart& parts, const Invocation&
   RunRequest request;
   request.platform = platform_.empty() && platform != nullptr ? platform : chosen_platforms().front();
   if (const auto name = single(fidelity_, "--fidelity")) choose_fidelity(request, *name);
+  choose_error(request);
   std::vector<Setting> settings;
   for (const Setting& setting : parse_settings(settings_)) {
     if (!restates_preprocessing(setting) || !of_file(invocation)(setting)) settings.push_back(setting);

@@ -45,6 +45,8 @@ class SimulationArguments {
   /// Those of a command that draws a scene in software as well, with kernels that it may name and set.
   void declare_whole_frames(Arguments& arguments);
   /// --frame and --multi-pass, for commands that draw frames of several draws as well.
+  /// --error and --seed.
+  void declare_error(Arguments& arguments);
   void declare_frames(Arguments& arguments);
   /// --views and --journal, for commands that draw a scene from many cameras as well.
   void declare_views(Arguments& arguments);
@@ -89,6 +91,9 @@ class SimulationArguments {
   Values meshes_;
   Values scene_, frame_, draws_, passes_, size_, camera_, eye_, look_at_, up_, fovy_, orthographic_;
   Values platform_, settings_, variant_, definitions_, units_, plugins_;
+  void choose_error(RunRequest& request) const;
+
+  Values error_, seed_;
   Values fidelity_, effects_, format_, termination_;
   Values views_, journal_, relative_to_;
   bool compares_any_ = false;

@@ -79,6 +79,16 @@ double parse_number(const std::string& text, const std::string& option) {
   return value;
 }
 
+double parse_percent(const std::string& text, const std::string& option) {
+  double value = 0;
+  const bool has_sign = !text.empty() && text.back() == '%';
+  if (!read_number(text.substr(0, text.size() - (has_sign ? 1 : 0)), value) || !(value > 0 && value <= 100)) {
+    throw UserError("bad value '" + text + "'", option, "it is not a percentage above 0 and up to 100",
+                    "give one, e.g. " + option + " 1%");
+  }
+  return value;
+}
+
 unsigned parse_count(const std::string& text, const std::string& option, unsigned largest) {
   unsigned value = 0;
   if (!read_number(text, value) || value < 1 || value > largest) {

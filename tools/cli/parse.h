@@ -18,6 +18,9 @@ namespace vrpipe::tools {
 /// A finite number.
 double parse_number(const std::string& text, const std::string& option);
 
+/// Percent, as 1% or 0.5: above 0 and up to 100.
+double parse_percent(const std::string& text, const std::string& option);
+
 /// A whole number from 1 to `largest`.
 unsigned parse_count(const std::string& text, const std::string& option, unsigned largest);
 

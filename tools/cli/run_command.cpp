@@ -16,6 +16,7 @@ class RunCommand : public Command {
 
   void declare(Arguments& arguments) override {
     arguments_.declare(arguments, SimulationArguments::Variants::one);
+    arguments_.declare_error(arguments);
     arguments_.declare_frames(arguments);
     arguments_.declare_page(arguments);
     arguments_.declare_energy(arguments);
@@ -34,7 +35,8 @@ class RunCommand : public Command {
         "  vrpipe run --size 320x180 --trace run.json@10000:20000 --log gpc0.crop@10000:10100\n"
         "  vrpipe run --size 320x180 --explain-effects\n"
         "  vrpipe run --plugin my_qru.so --unit qru=my-qru\n"
-        "  vrpipe run --fidelity functional --termination strict");
+        "  vrpipe run --fidelity functional --termination strict\n"
+        "  vrpipe run --scene builtin:train --fidelity sampled --seed 7");
   }
 
   void run() override {

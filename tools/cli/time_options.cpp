@@ -36,16 +36,20 @@ std::vector<std::string> default_statistics(const RunRequest& request) {
 
 /// Whether it is known what is when.
 bool has_course(const RunRequest& request) {
-  return request.fidelity != Fidelity::functional && request.fidelity != Fidelity::bound;
+  return request.fidelity != Fidelity::functional && request.fidelity != Fidelity::bound && !request.sampling;
 }
 
 void check_has_time(const SimulationJob& job, const std::string& option) {
   if (has_course(job.requests.front())) return;
-  const Fidelity fidelity = job.requests.front().fidelity;
+  const RunRequest& request = job.requests.front();
+  if (request.error_percent > 0) {
+    throw UserError("cannot use option", option, "--error takes ways on which it is not known what is when",
+                    "use --fidelity lt or cycle in place of --error");
+  }
   throw UserError("cannot use option", option,
-                  std::string("fidelity ") + vrpipe::name_of(fidelity) +
-                      (fidelity == Fidelity::bound ? " knows how long a run takes, but not what is when"
-                                                   : " has no time"),
+                  "fidelity " + fidelity_of(request) +
+                      (request.fidelity == Fidelity::functional ? " has no time"
+                                                                : " knows how long a run takes, but not what is when"),
                   "use lt or cycle");
 }
 

@@ -242,12 +242,14 @@ bool can_be(const RunRequest& request) {
   return true;
 }
 
-bool is_finest(const RunRequest& request) { return request.fidelity == finest_fidelity(request.variant); }
+bool is_finest(const RunRequest& request) {
+  return request.fidelity == finest_fidelity(request.variant) && !request.sampling;
+}
 bool is_of_pipeline(const RunRequest& request) { return request.variant.is_of_pipeline(); }
 
 /// The runs of the fidelity ladder: for each variant from the most exact fidelity on, so that its image is there to
 /// compare with.
-std::vector<RunRequest> fidelity_requests(const AccuracyJob& job) {
+std::vector<RunRequest> fidelity_requests(const AccuracyJob& job, const Workload& workload) {
   std::vector<RunRequest> requests;
   for (const RunRequest& request : job.simulation.requests) {
     const Variant& variant = request.variant;
@@ -263,7 +265,11 @@ std::vector<RunRequest> fidelity_requests(const AccuracyJob& job) {
         }
       }
       level.units_at_cycle.clear();
-      requests.push_back(std::move(level));
+      requests.push_back(level);
+      if (*fidelity != Fidelity::cycle) continue;
+      level.sampling.emplace();
+      if (takes_windows(level, *make_frame(level, workload.description, workload.frame)))
+        requests.push_back(std::move(level));
     }
   }
   return requests;
@@ -583,7 +589,7 @@ AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) 
     reference = make_reference(job, workload, values, result);
   }
 
-  const std::vector<RunRequest> levels = fidelity_requests(job);
+  const std::vector<RunRequest> levels = fidelity_requests(job, workload);
   const std::vector<Task> stress = stress_tasks(job, workload, result);
   const std::size_t climbs = job.repeat * levels.size();
   const Stopwatch ladders;

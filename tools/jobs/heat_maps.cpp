@@ -82,7 +82,8 @@ nlohmann::ordered_json legend(const std::vector<NamedChannel>& channels) {
 }  // namespace
 
 HeatMaps::HeatMaps(std::uint32_t width, std::uint32_t height, const RunRequest& request)
-    : has_time_(has_time(request.fidelity)),
+    // Of a run in windows, what is seen has no time.
+    : has_time_(!request.sampling && has_time(request.fidelity)),
       is_of_pipeline_(request.variant.is_of_pipeline()),
       fates_(width, height),
       cycles_(width, height) {}

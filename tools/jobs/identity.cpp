@@ -62,7 +62,10 @@ nlohmann::json request_identity(const RunRequest& request) {
     return all;
   };
   const Variant& variant = request.variant;
-  return {{"platform", valid_utf8(request.platform->name)},
+  nlohmann::json sampling;
+  if (request.sampling) sampling = {request.sampling->windows, request.sampling->seed, request.error_percent};
+  return {{"sampling", std::move(sampling)},
+          {"platform", valid_utf8(request.platform->name)},
           {"variant",
            {valid_utf8(variant.name), valid_utf8(variant.base), units(variant.changed_units),
             settings_identity(variant.changed_settings)}},

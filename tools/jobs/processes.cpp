@@ -253,7 +253,7 @@ Simulated simulate_here(const RunRequest& request, const Frame& frame, bool with
     const ProgressThread drawing(name_of(request), done, progress);
     if (!loaded_plugins().empty()) report_crashes("variant " + name_of(request) + ": ");
     simulated.result = simulate(of_variant_alone(request), frame, &done);
-    simulated.result.request = request;
+    simulated.result.request = as_taken(request, simulated.result.way);
   }
   progress.erase();
   if (with_image) {

@@ -61,9 +61,12 @@ VRPIPE_MEMBERS(EffectReport, name, omitted, proof, reason)
 VRPIPE_MEMBERS(UnitIntervals, name, cycles)
 VRPIPE_MEMBERS(StatisticIntervals, name, kind, values, denominators)
 VRPIPE_MEMBERS(IntervalReport, every, from, units, statistics)
+VRPIPE_MEMBERS(WayReport, fidelity, why)
+VRPIPE_MEMBERS(SamplingReport, windows, seed, measured_share, warm_up_share, half_interval_percent)
 VRPIPE_MEMBERS(RunResult, request, cycles, stopped, milliseconds, host_seconds, cpu_seconds, counts, utilization, units,
                bottleneck, kernels, statistics, implementations, parameters, outside_validated_range,
-               expected_error_percent, effects, result_hash, kernel_events, framebuffer, draws, intervals)
+               expected_error_percent, effects, sampling, way, result_hash, kernel_events, framebuffer, draws,
+               intervals)
 
 /// Types of members that stay behind.
 template <class Member>
@@ -231,7 +234,7 @@ Record encode(const RunResult& result) { return Writer::of(result); }
 RunResult decode(const Record& json, const RunRequest& request) {
   RunResult result;
   Reader::read(json, result, "result");
-  result.request = request;
+  result.request = as_taken(request, result.way);
   return result;
 }
 

@@ -232,7 +232,8 @@ std::string functional_note(const AccuracyResult& result) {
 std::string omitted_effects_section(const AccuracyResult& result) {
   std::vector<const RunResult*> runs;
   for (const FidelityLevel& level : result.fidelity) {
-    if (level.run.request.fidelity == fidelities().back() && !level.run.effects.empty()) runs.push_back(&level.run);
+    if (level.run.request.fidelity == fidelities().back() && !level.run.request.sampling && !level.run.effects.empty())
+      runs.push_back(&level.run);
   }
   if (runs.empty()) return {};
   return fmt::format(

@@ -166,7 +166,9 @@ std::vector<std::string> levels_of(const AccuracyResult& result) {
 
 FidelityRange range_of(const AccuracyResult& result, const std::string& fidelity) {
   FidelityRange range;
-  const auto is_finest = [](const RunRequest& request) { return request.fidelity == finest_fidelity(request.variant); };
+  const auto is_finest = [](const RunRequest& request) {
+    return request.fidelity == finest_fidelity(request.variant) && !request.sampling;
+  };
   for (const FidelityLevel& level : result.fidelity) {
     if (fidelity_of(level.run.request) != fidelity) continue;
     range.is_reference = range.is_reference && is_finest(level.run.request);
@@ -217,7 +219,7 @@ std::string most_exact_text(const AccuracyResult& result) {
     std::vector<std::string> names;
     for (const FidelityLevel& level : result.fidelity) {
       const Variant& variant = level.run.request.variant;
-      const bool is_finest = level.run.request.fidelity == finest_fidelity(variant);
+      const bool is_finest = level.run.request.fidelity == finest_fidelity(variant) && !level.run.request.sampling;
       if (is_finest && level.run.request.fidelity == *fidelity) names.push_back(variant.name);
     }
     if (names.empty()) continue;

@@ -380,13 +380,38 @@ std::string validated_text(const std::vector<RunResult>& runs) {
 std::string expected_error_text(const std::vector<RunResult>& runs) {
   std::vector<std::string> parts;
   for (const RunResult& run : runs) {
-    if (run.expected_error_percent.value_or(0) == 0) continue;
+    if (run.expected_error_percent.value_or(0) == 0 || run.sampling) continue;
     parts.push_back(
         fmt::format("{}+-{:.1f} %", runs.size() > 1 ? name_of(run.request) + " " : "", *run.expected_error_percent));
   }
   if (parts.empty()) return {};
   return fmt::format("{}: cycles within {}, as nine of ten runs whose bottleneck is as busy\n",
                      fidelity_of(runs.front().request), fmt::join(parts, ", "));
+}
+
+/// How cycles of windows, and those within an error, were come by.
+std::string sampling_text(const std::vector<RunResult>& runs) {
+  std::string text;
+  for (const RunResult& run : runs) {
+    const std::string name = runs.size() > 1 ? name_of(run.request) + ": " : "";
+    if (run.way) {
+      text += fmt::format("{}--error {:g}% took {}: {}\n", name, run.request.error_percent, run.way->fidelity,
+                          run.way->why);
+    }
+    if (!run.sampling) continue;
+    const SamplingReport& sampling = *run.sampling;
+    if (sampling.windows == 0) {
+      text += fmt::format("{}sampled: all of the frame at cycle, since windows would be half of it\n", name);
+      continue;
+    }
+    text += fmt::format(
+        "{}sampled: {} cycles, {:g} of 100 within +-{:.1f} %, {} windows with {:.1f} % of them and {:.1f} % to warm "
+        "up, "
+        "seed {}\n",
+        name, grouped(*run.cycles), SamplingReport::confidence_percent, sampling.half_interval_percent,
+        sampling.windows, 100 * sampling.measured_share, 100 * sampling.warm_up_share, sampling.seed);
+  }
+  return text;
 }
 
 /// What quad merging adds, once for all runs that add the same.
@@ -442,7 +467,7 @@ std::string remarks(const JobResult& result) {
   text += stopped_text(runs.front());
   text += fidelities_text(runs) + drawn_otherwise_text(runs);
   for (const RunResult& run : runs) text += bound_text(run);
-  text += expected_error_text(runs) + validated_text(runs);
+  text += sampling_text(runs) + expected_error_text(runs) + validated_text(runs);
   if (const auto early = early_termination_ratio(runs)) {
     text += fmt::format("early-termination ratio {:.2f} (fragments blended without over with termination)\n", *early);
   }
@@ -492,7 +517,7 @@ bool draws_nothing(const RunResult& run, const SceneSummary& scene) {
 std::string fidelities_text(const std::vector<RunResult>& runs) {
   std::string text;
   for (const RunResult& run : runs) {
-    if (run.request.fidelity >= finest_fidelity_of(runs)) continue;
+    if (run.way || run.request.fidelity >= finest_fidelity_of(runs)) continue;
     text +=
         fmt::format("{} is at {}: there is nothing more exact of it\n", name_of(run.request), fidelity_of(run.request));
   }
@@ -520,8 +545,8 @@ std::vector<std::string> notes_of(const JobResult& result) {
   if (draws_nothing(result.runs.front(), result.scene)) {
     text += nothing_visible(result.scene, result.viewpoint.has_value()) + "\n";
   }
-  text += anomaly_text(result.runs) + expected_error_text(result.runs) + validated_text(result.runs) +
-          rejected_text(result.scene.rejected);
+  text += anomaly_text(result.runs) + sampling_text(result.runs) + expected_error_text(result.runs) +
+          validated_text(result.runs) + rejected_text(result.scene.rejected);
   for (const std::string& note : result.scene.notes) text += "note: " + note + "\n";
   text += storage_text(result.runs);
   std::vector<std::string> lines;

@@ -219,6 +219,15 @@ Json storage_json(const RunRequest& request) {
   return {{"tgc", storage.tgc_bytes}, {"qru", storage.qru_bytes}};
 }
 
+Json sampling_json(const SamplingReport& sampling) {
+  return {{"windows", sampling.windows},
+          {"seed", sampling.seed},
+          {"measured_share", sampling.measured_share},
+          {"warm_up_share", sampling.warm_up_share},
+          {"half_interval_percent", sampling.half_interval_percent},
+          {"confidence_percent", SamplingReport::confidence_percent}};
+}
+
 /// @param parameters  of platform_json()
 Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, const EffectCosts* costs,
               const Json& parameters) {
@@ -251,6 +260,17 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, con
   if (!run.request.variant.is_of_pipeline()) {
     json["fidelity"] = fidelity_of(run.request);
     json["kernels"] = kernels_json(run.kernels);
+  }
+  if (run.way) {
+    json["fidelity"] = run.way->fidelity;
+    json["error"] = {{"asked_percent", run.request.error_percent}, {"way", run.way->fidelity}, {"why", run.way->why}};
+  }
+  if (run.sampling) {
+    json["sampling"] = sampling_json(*run.sampling);
+    // What only the time of the whole frame tells.
+    if (run.sampling->windows != 0) {
+      for (const char* const key : {"bottleneck", "utilization", "units", "kernel_events", "stopped"}) json.erase(key);
+    }
   }
   if (run.intervals) json["intervals"] = intervals_json(*run.intervals);
   if (costs != nullptr) json["all_effects"]["host_seconds"] = {{"with", costs->with_all}, {"without", costs->without}};

@@ -207,6 +207,8 @@ class SectoredCache {
   /// And what all hold.
   void invalidate();
   std::uint32_t lines_held() const { return held_; }
+  /// Holds what another one of the same organization does, of which no line is pinned or on its way. Nothing is counted.
+  void hold_as(const SectoredCache& other);
 
  private:
   static constexpr std::uint64_t no_tag = ~std::uint64_t{0};

@@ -59,6 +59,11 @@ class DepthStencilSurface {
   void preset_stencil(const std::vector<std::uint8_t>& values, std::uint32_t width);
   /// Whether it was not cleared at first.
   bool is_preset() const { return is_preset_; }
+  /// It holds what was drawn before, so that not all of it is as a clear has left it.
+  void go_on() { goes_on_ = true; }
+  bool goes_on() const { return goes_on_; }
+  /// Whether a quad is as the first clear has left it.
+  bool is_as_cleared(std::size_t place) const;
   /// In the screen tiles of a GPC.
   void clear(const Clear& clear, const Placement& placement);
   /// Byte address of a quad in the modelled memory. Tiles, and quads in them, are naturally aligned.
@@ -77,6 +82,7 @@ class DepthStencilSurface {
   std::vector<std::uint8_t> terminated_;
   std::vector<DepthStencilQuad> quads_;  ///< or none
   bool is_preset_ = false;
+  bool goes_on_ = false;
 };
 
 /// What a frame is drawn into.

@@ -29,7 +29,7 @@ enum class Fidelity : std::uint8_t { functional, bound, lt, cycle };
 const char* name_of(Fidelity fidelity);
 /// All, the least exact first.
 const std::vector<Fidelity>& fidelities();
-/// Throws UserError naming those that exist.
+/// One of `fidelities()`. Throws UserError naming those that exist.
 Fidelity fidelity_named(const std::string& name);
 
 /// `--set UNIT.PARAMETER=VALUE`.
@@ -98,6 +98,12 @@ void add_platform(Platform platform);
 /// Throws UserError naming the nearest.
 const Platform& platform_named(const std::string& name);
 
+/// Cycles by windows of the frame that are simulated at `cycle`, while all of it is drawn without time.
+struct Sampling {
+  std::uint64_t windows = 0;  ///< beside the first and the last; at least 16. 0: what is usual
+  std::uint64_t seed = 1;     ///< of where they are
+};
+
 /// One simulation.
 struct RunRequest {
   const Platform* platform = nullptr;
@@ -106,6 +112,13 @@ struct RunRequest {
   Fidelity fidelity = Fidelity::cycle;
   /// At fidelity `lt`: slots, or paths of units, that are simulated at `cycle` all the same. At others it says nothing.
   std::vector<std::string> units_at_cycle;
+  /// At fidelity `cycle`, where one GPC draws splats in one draw: not all is simulated. The image, counts and statistics are those
+  /// of `functional`. A frame that windows would cover half of is simulated whole.
+  std::optional<Sampling> sampling;
+  /// The run takes the cheapest way to cycles that are within so many percent: `lt`, if it says so of itself; as many windows as
+  /// that needs; or all at `cycle`. The fidelity of the request says nothing then, of its sampling the seed alone counts. 0: as
+  /// asked for.
+  double error_percent = 0;
   ColorFormat format = ColorFormat::rgba16f;
   Termination termination = Termination::paper;
   std::vector<Setting> settings;
@@ -127,10 +140,20 @@ struct RunRequest {
   /// For tests: ticks units in a random order drawn from this seed; 0 for the order of wiring.
   std::uint64_t tick_order_seed = 0;
 };
-/// Sets what `--fidelity` says: one for all, or lt and units that are at cycle: lt,crop=cycle,gpc0.zrop=cycle. Throws UserError.
+/// Sets what `--fidelity` says: one for all; lt and units that are at cycle: lt,crop=cycle,gpc0.zrop=cycle; or sampled. Throws
+/// UserError.
 void choose_fidelity(RunRequest& request, const std::string& text);
-/// The same of a run: lt, or lt,crop=cycle.
+/// The names of all that choose_fidelity takes, but for units.
+std::vector<std::string> fidelity_names();
+/// The same of a run: lt, lt,crop=cycle or sampled.
 std::string fidelity_of(const RunRequest& request);
+/// The way that a run took to an error that it was asked for.
+struct WayReport {
+  std::string fidelity;  ///< as fidelity_of has it
+  std::string why;       ///< one line
+};
+/// A request as its run has taken it: of one that was asked for an error, at the fidelity of its way.
+RunRequest as_taken(const RunRequest& request, const std::optional<WayReport>& way);
 /// GPCs of the platform, by its settings, those of the variant and of the run. Throws UserError for a number that cannot be.
 unsigned gpcs_of(const RunRequest& request);
 /// The GPC that owns a screen tile, as the platform's crossbar has it; 0 where there is one GPC.
@@ -245,6 +268,17 @@ struct KernelReport {
   std::optional<double> core_cycles;        ///< in which a core has warps, of all cores
 };
 
+/// How the cycles of a sampled run were come by.
+struct SamplingReport {
+  std::uint64_t windows = 0;  ///< 0: all was simulated
+  std::uint64_t seed = 0;     ///< of where they are
+  double measured_share = 1;  ///< of the cycles: those in windows
+  double warm_up_share = 0;   ///< those before them, until each was as the whole frame is there, in the same unit
+  double half_interval_percent =
+      0;  ///< the cycles of `cycle` are so near in `confidence_percent` frames and seeds of 100
+  static constexpr double confidence_percent = 95;
+};
+
 struct RunResult {
   RunRequest request;
   std::optional<std::uint64_t> cycles;  ///< none where the fidelity has no time
@@ -272,6 +306,10 @@ struct RunResult {
   std::optional<double> expected_error_percent;
   /// All that the platform's components declare, by name, and what became of each in this run.
   std::vector<EffectReport> effects;
+  /// Of a run that was sampled. Units and utilization are empty then, unless all was simulated.
+  std::optional<SamplingReport> sampling;
+  /// Of a run that was asked for an error; `request` is as it was taken then.
+  std::optional<WayReport> way;
   std::string result_hash;          ///< of counts, cycles and the stored bits of the image, 16 hex digits
   std::uint64_t kernel_events = 0;  ///< activations of the SystemC kernel's processes
   Framebuffer framebuffer;
@@ -297,6 +335,9 @@ DevicePrecision device_precision_of(const RunRequest& request);
 RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<float>* progress = nullptr);
 /// A frame of one draw, of the state that the request gives.
 RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<float>* progress = nullptr);
+
+/// Whether a run with a sampling takes windows: of a frame that it can have them of, and that is not so small that all is simulated.
+bool takes_windows(const RunRequest& request, const Frame& frame);
 
 /// Checks settings, unit choices and what is to be observed against a platform without running anything; throws
 /// UserError. With statistics to be sampled, not while a simulation of this process is elaborated.

@@ -1,0 +1,402 @@
+#include "run/frame_sampler.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "elaboration/untimed_gpu.h"
+
+#include <vrpipe/arithmetic/random.h>
+#include <vrpipe/model/memory_unit.h>
+#include <vrpipe/platforms/configuration.h>
+#include <vrpipe/platforms/gpu.h>
+
+namespace vrpipe {
+
+namespace {
+
+struct CounterName {
+  const char* slot;
+  const char* name;
+};
+/// What may bound a frame at one place or another, in the order of SampledWork.
+constexpr std::array<CounterName, counted_work_kinds> work_names{{{"raster", "raster_tiles_tested"},
+                                                                  {"raster", "raster_tiles_kept"},
+                                                                  {"raster", "screen_tile_pairs"},
+                                                                  {"raster", "setups"},
+                                                                  {"sm", "fragment_warps"},
+                                                                  {"crop", "quads_blended"}}};
+
+/// Of the course, in quads.
+constexpr double quads_of_step = 2048;
+// Of a window, in quads. Between those that terminate, queues between RASTER and CROP take long to be as full as they are in the
+// whole frame: measured (docs/accuracy.md).
+constexpr double measured_quads = 20000;
+constexpr double warm_up_quads = 20000;
+constexpr double warm_up_quads_of_termination = 80000;
+// Percent, of windows that begin otherwise than the frame goes on, whatever their number: measured (docs/accuracy.md).
+constexpr double bias_percent = 0.3;
+constexpr double bias_percent_of_termination = 1.5;
+// Half the interval times the root of the number of windows, percent: measured (docs/accuracy.md).
+constexpr double spread_percent = 4;
+constexpr double spread_percent_of_termination = 13;
+constexpr std::uint64_t fewest_windows = 16;
+
+bool terminates(const RunRequest& request) { return request.variant.early_termination; }
+
+/// When a count that is looked at now and then reaches a value.
+class Passing {
+ public:
+  explicit Passing(double value) : value_(value) {}
+  bool has_been() const { return has_been_; }
+  double cycle() const { return cycle_; }
+  /// Between two looks it goes on evenly.
+  void look(double count, double cycle) {
+    if (!has_been_ && count >= value_) {
+      has_been_ = true;
+      const double share = count > count_before_ ? (count - value_) / (count - count_before_) : 0;
+      cycle_ = cycle - share * (cycle - cycle_before_);
+    }
+    count_before_ = count;
+    cycle_before_ = cycle;
+  }
+
+ private:
+  double value_;
+  double cycle_ = 0;
+  double count_before_ = 0, cycle_before_ = 0;
+  bool has_been_ = false;
+};
+
+/// Quads that nobody does anything with any more.
+std::uint64_t retired(const Counts& counts) {
+  return counts.quads_depth_stencil_failed + counts.quads_terminated + counts.quads_unshaded + counts.quads_pruned +
+         counts.quads_merged + counts.quads_dropped_late + counts.quads_late_failed + counts.quads_unblended +
+         counts.quads_blended;
+}
+
+/// The share of a range around a centre that is from 0 to `size`.
+double share_on_screen(double center, double extent, double size) {
+  return std::max(0.0, std::min(center + extent, size) - std::max(center - extent, 0.0)) / std::max(2 * extent, 1e-9);
+}
+
+/// Of a splat, about: those in its box and half of those that its edges cross, where they are on the screen.
+double estimated_quads(const Splat& splat, const Frame& frame) {
+  const double across = std::sqrt(double{splat.ax} * splat.ax + double{splat.ay} * splat.ay);
+  const double along = std::sqrt(double{splat.bx} * splat.bx + double{splat.by} * splat.by);
+  return (across * along + across + along + 1) *
+         share_on_screen(splat.cx, std::fabs(splat.ax) + std::fabs(splat.bx), frame.width()) *
+         share_on_screen(splat.cy, std::fabs(splat.ay) + std::fabs(splat.by), frame.height());
+}
+
+}  // namespace
+
+FrameProgress::FrameProgress(const UntimedGpu& gpu) {
+  for (const UntimedGpu::Placed& placed : gpu.units()) add(placed.instance->slot, placed.unit->behaviour());
+}
+
+FrameProgress::FrameProgress(const Gpu& gpu) {
+  for (const Gpu::Placed& placed : gpu.units()) add(placed.instance->slot, *placed.behaviour);
+}
+
+void FrameProgress::add(const std::string& slot, const Behaviour& behaviour) {
+  behaviours_.push_back(&behaviour.unit());
+  for (const Counter* const counter : behaviours_.back()->counters()) {
+    const auto is = [&](const CounterName& name) { return slot == name.slot && counter->name() == name.name; };
+    if (is({"draw", "splats"})) splats_.push_back(counter);
+    if (is({"raster", "quads_rasterized"})) quads_.push_back(counter);
+    for (std::size_t kind = 0; kind < work_names.size(); ++kind) {
+      if (is(work_names[kind])) work_[kind].push_back(counter);
+    }
+  }
+}
+
+std::uint64_t FrameProgress::sum(const Counters& counters) {
+  std::uint64_t sum = 0;
+  for (const Counter* const counter : counters) sum += counter->value();
+  return sum;
+}
+
+Counts FrameProgress::counts() const {
+  Counts counts;
+  for (const Behaviour* const behaviour : behaviours_) behaviour->add_to(counts, CountOf());
+  return counts;
+}
+
+SampledWork FrameProgress::work() const {
+  SampledWork work{};
+  for (std::size_t kind = 0; kind < work_.size(); ++kind) work[kind] = static_cast<double>(sum(work_[kind]));
+  return work;
+}
+
+std::optional<UserError> FrameSampler::obstacle(const RunRequest& request) {
+  const auto refuse = [](const std::string& where, const std::string& why, const std::string& remedy) {
+    return UserError("cannot be sampled", where, why, remedy);
+  };
+  if (!request.variant.is_of_pipeline()) {
+    return refuse("variant " + request.variant.name, "windows are of splats on their way through the pipeline",
+                  "use lt or cycle");
+  }
+  if (request.fidelity != Fidelity::cycle) {
+    return refuse(std::string("fidelity ") + name_of(request.fidelity), "windows are simulated at cycle", "use cycle");
+  }
+  if (gpcs_of(request) > 1) {
+    return refuse("platform " + request.platform->name,
+                  "windows are of one GPC: several do not come as far side by side",
+                  "use lt or cycle, or platform.gpcs=1");
+  }
+  if (request.sampling && request.sampling->windows != 0 && request.sampling->windows < fewest_windows) {
+    return refuse(fmt::format("{} windows", request.sampling->windows), "they say too little of what is between them",
+                  fmt::format("take {} at least", fewest_windows));
+  }
+  if (request.stop_at > 0) return refuse("--until", "no cycle is known by its number", "use cycle");
+  return std::nullopt;
+}
+
+std::optional<UserError> FrameSampler::obstacle(const Frame& frame) {
+  const auto refuse = [](const std::string& why) {
+    return UserError("cannot be sampled", "the frame", why, "use lt or cycle");
+  };
+  if (frame.commands().size() > 1) return refuse("it has several draws or clears, and windows are of one");
+  if (frame.draws().empty()) return std::nullopt;
+  const DrawCall& call = frame.draws().front();
+  if (!call.geometry->triangles.empty() || !call.geometry->mesh.empty())
+    return refuse("it has triangles, and windows are of splats");
+  if (frame.stencil_preset() != nullptr) return refuse("its stencil is preset, and windows know it cleared or drawn");
+  return std::nullopt;
+}
+
+std::uint64_t FrameSampler::usual_windows(const RunRequest& request) { return terminates(request) ? 40 : 24; }
+
+std::optional<std::uint64_t> FrameSampler::windows_for(const RunRequest& request, double error_percent) {
+  const double random_percent = error_percent - (terminates(request) ? bias_percent_of_termination : bias_percent);
+  if (random_percent <= 0) return std::nullopt;
+  const double root = (terminates(request) ? spread_percent_of_termination : spread_percent) / random_percent;
+  // More than there are in any frame are as good as all of these.
+  return std::max(fewest_windows, static_cast<std::uint64_t>(std::min(std::ceil(root * root), 1e6)));
+}
+
+std::uint64_t FrameSampler::more_windows(const RunRequest& request, std::uint64_t windows, double half_interval_percent,
+                                         double error_percent) {
+  const double bias = terminates(request) ? bias_percent_of_termination : bias_percent;
+  // A fifth more, since what they say of their spread is spread as well.
+  const double times = 1.2 * std::pow((half_interval_percent - bias) / (error_percent - bias), 2);
+  return static_cast<std::uint64_t>(std::ceil(static_cast<double>(windows) * std::clamp(times, 1.0, 4.0)));
+}
+
+FrameSampler::FrameSampler(const RunRequest& request, const Frame& frame)
+    : request_(request),
+      frame_(frame),
+      warm_up_quads_(terminates(request) ? warm_up_quads_of_termination : warm_up_quads) {
+  request_.sampling.reset();
+  request_.observers = nullptr;
+  request_.reads_statistics = false;
+  std::vector<double> before{0};  // quads, by splat
+  for (std::uint32_t i = 0; i < frame.splats(); ++i)
+    before.push_back(before.back() + estimated_quads(frame.draws().front().splat(i), frame));
+  estimated_quads_ = before.back();
+  const auto splat_at = [&](double quads) {
+    const auto splat =
+        static_cast<std::uint32_t>(std::lower_bound(before.begin(), before.end(), quads) - before.begin());
+    return std::min(splat, frame.splats()) / splats_per_vertex_warp * splats_per_vertex_warp;
+  };
+  const double begin = measured_quads;
+  // The estimate may be a third too high without a window that reaches beyond the frame.
+  const double end = std::max(begin, 0.97 * estimated_quads_ - 4 * measured_quads);
+  const std::uint64_t strata = request.sampling->windows != 0 ? request.sampling->windows : usual_windows(request);
+  const double length = (end - begin) / static_cast<double>(strata);
+  windows_.push_back({0, splat_at(begin)});
+  for (std::uint64_t i = 0; i < strata; ++i) {
+    const double from = begin + length * static_cast<double>(i);
+    const double drawn = static_cast<double>(mix(request.sampling->seed ^ mix(i)) >> 11U) * 0x1p-53;  // in [0, 1)
+    const double at = from + drawn * std::max(0.0, length - measured_quads);
+    windows_.push_back({splat_at(at - warm_up_quads_), splat_at(from + length)});
+  }
+  windows_.push_back({splat_at(end - warm_up_quads_), frame.splats()});
+}
+
+bool FrameSampler::is_worth_while() const {
+  return static_cast<double>(windows_.size()) * (measured_quads + warm_up_quads_) < estimated_quads_ / 2;
+}
+
+void FrameSampler::begin(const UntimedGpu& gpu, const Framebuffer& framebuffer) {
+  gpu_ = &gpu;
+  drawn_ = &framebuffer;
+  progress_.emplace(gpu);
+  steps_.assign(1, {});
+  own_ = framebuffer;
+  passed();
+}
+
+void FrameSampler::take_step() {
+  steps_.push_back({progress_->splats(), progress_->counts().primitives, static_cast<double>(progress_->rasterized()),
+                    progress_->work()});
+}
+
+void FrameSampler::passed() {
+  if (static_cast<double>(progress_->rasterized()) >= steps_.back().quads + quads_of_step) take_step();
+  while (next_ < windows_.size() && progress_->splats() >= windows_[next_].splat) simulate(windows_[next_++]);
+}
+
+void FrameSampler::simulate(Window& window) {
+  const bool is_first = &window == &windows_.front();
+  own_.color = drawn_->color;
+  own_.depth_stencil = drawn_->depth_stencil;
+  if (!is_first) own_.depth_stencil.go_on();
+  const Frame part = frame_.part(static_cast<std::uint32_t>(progress_->splats()), frame_.splats());
+  const double from = is_first ? 0 : warm_up_quads_;
+  const Measured measured = measure(part, from, &window == &windows_.back());
+  window.cycles = measured.cycle_to - measured.cycle_from;
+  window.from = static_cast<double>(progress_->rasterized()) + from;
+  window.to = window.from + measured_quads;
+  const std::uint64_t primitives = progress_->counts().primitives;
+  primitives_.emplace_back(primitives + measured.primitives_from, primitives + measured.primitives_to);
+  measured_ += window.cycles;
+  warm_up_ += measured.cycle_from;
+}
+
+/// Passes of the rasteriser and of the end of the pipeline, whose mean each is: the one alone would see what is between them fill
+/// and empty.
+FrameSampler::Measured FrameSampler::measure(const Frame& part, double from, bool to_end) {
+  constexpr Cycle looks_every = 64;
+  fresh_simulation();
+  Measured measured;
+  {
+    const Configuration configuration(request_, part);
+    Gpu gpu(configuration, own_);
+    for (const Gpu::PlacedMemory& placed : gpu.memories()) {
+      if (const MemoryBehaviour* const held = gpu_->memory(placed.instance->path))
+        placed.memory->behaviour().hold_as(*held);
+    }
+    const FrameProgress progress(gpu);
+    Passing in_from(from), in_to(from + measured_quads), out_from(from), out_to(from + measured_quads);
+    gpu.clock().look_between_edges(looks_every, [&](Cycle now) {
+      const Counts counts = progress.counts();
+      const auto in = static_cast<double>(counts.quads_rasterized);
+      const auto out = static_cast<double>(retired(counts));
+      const auto cycle = static_cast<double>(now);
+      for (Passing* const passing : {&in_from, &in_to}) passing->look(in, cycle);
+      for (Passing* const passing : {&out_from, &out_to}) passing->look(out, cycle);
+      if (!in_from.has_been()) measured.primitives_from = counts.primitives;
+      if (!in_to.has_been()) measured.primitives_to = counts.primitives;
+      if (!to_end && out_to.has_been()) gpu.clock().stop_at(now + 1);
+      return now + looks_every;
+    });
+    const auto end = static_cast<double>(gpu.run(nullptr));
+    if (from > 0) measured.cycle_from = (in_from.cycle() + out_from.cycle()) / 2;
+    measured.cycle_to = to_end ? end : (in_to.cycle() + out_to.cycle()) / 2;
+    is_whole_ = is_whole_ && out_from.has_been() && (to_end || out_to.has_been());
+  }
+  fresh_simulation();
+  return measured;
+}
+
+void FrameSampler::end() {
+  take_step();
+  find_in_course();
+  find_busiest();
+}
+
+/// TGC holds primitives when a window begins, and the window's own is empty then: its quads are later ones.
+void FrameSampler::find_in_course() {
+  for (std::size_t i = 1; i < windows_.size(); ++i) {
+    Window& window = windows_[i];
+    const double from_later = quads_at_primitive(primitives_[i].first) - window.from;
+    const double to_later = quads_at_primitive(primitives_[i].second) - window.to;
+    const double later = i + 1 == windows_.size() ? from_later : (from_later + to_later) / 2;
+    window.from += later;
+    window.to += later;
+  }
+}
+
+/// Of each step the kind of work that takes longest, where an item takes what it does in the tenth of windows that are through with
+/// it soonest.
+void FrameSampler::find_busiest() {
+  SampledWork prices{};
+  for (std::size_t kind = 0; kind < counted_work_kinds; ++kind) {
+    std::vector<double> of_windows;
+    for (std::size_t i = 1; i + 1 < windows_.size(); ++i) {
+      const double work = work_between(windows_[i].from, windows_[i].to)[kind];
+      if (work > 0) of_windows.push_back(windows_[i].cycles / work);
+    }
+    if (of_windows.empty()) continue;
+    std::sort(of_windows.begin(), of_windows.end());
+    prices[kind] = of_windows[of_windows.size() / 10];
+  }
+  for (std::size_t i = 1; i < steps_.size(); ++i) {
+    double busiest = 0;
+    for (std::size_t kind = 0; kind < counted_work_kinds; ++kind)
+      busiest = std::max(busiest, prices[kind] * (steps_[i].work[kind] - steps_[i - 1].work[kind]));
+    steps_[i].work.back() = steps_[i - 1].work.back() + busiest;
+  }
+}
+
+namespace {
+/// What goes on evenly from one step to the next, where another quantity has a value.
+template <class Step, class Of, class At>
+double interpolated(const std::vector<Step>& steps, double value, const At& at, const Of& of) {
+  const auto next = std::lower_bound(steps.begin(), steps.end(), value,
+                                     [&](const Step& step, double wanted) { return at(step) < wanted; });
+  if (next == steps.end()) return of(steps.back());
+  if (next == steps.begin()) return of(steps.front());
+  const Step& before = *(next - 1);
+  const double share = (value - at(before)) / (at(*next) - at(before));
+  return of(before) + share * (of(*next) - of(before));
+}
+}  // namespace
+
+double FrameSampler::quads_at_primitive(std::uint64_t primitive) const {
+  return interpolated(
+      steps_, static_cast<double>(primitive), [](const Step& step) { return static_cast<double>(step.primitives); },
+      [](const Step& step) { return step.quads; });
+}
+
+double FrameSampler::quads_at_splat(std::uint32_t splat) const {
+  return interpolated(
+      steps_, splat, [](const Step& step) { return static_cast<double>(step.splats); },
+      [](const Step& step) { return step.quads; });
+}
+
+SampledWork FrameSampler::work_between(double from, double to) const {
+  SampledWork work{};
+  for (std::size_t kind = 0; kind < work.size(); ++kind) {
+    const auto at = [&](double quads) {
+      return interpolated(
+          steps_, quads, [](const Step& step) { return step.quads; },
+          [&](const Step& step) { return step.work[kind]; });
+    };
+    work[kind] = at(to) - at(from);
+  }
+  return work;
+}
+
+std::optional<FrameSampler::Result> FrameSampler::result() const {
+  if (!is_whole_) return std::nullopt;
+  const Window& head = windows_.front();
+  const Window& tail = windows_.back();
+  std::vector<SampledStratum> strata;
+  double from = head.to;
+  for (std::size_t i = 1; i + 1 < windows_.size(); ++i) {
+    const Window& window = windows_[i];
+    const bool is_last = i + 2 == windows_.size();
+    const double to = std::max(from, is_last ? tail.from : quads_at_splat(window.stratum_end));
+    strata.push_back({to - from, work_between(from, to), window.to - window.from, work_between(window.from, window.to),
+                      window.cycles});
+    from = to;
+  }
+  const EstimatedTime middle = estimate_time(strata);
+  const double cycles = middle.cycles + head.cycles + tail.cycles;
+  Result result;
+  result.cycles = static_cast<std::uint64_t>(cycles + 0.5);
+  result.report.windows = windows_.size();
+  result.report.measured_share = measured_ / cycles;
+  result.report.warm_up_share = warm_up_ / cycles;
+  result.report.half_interval_percent =
+      100 * middle.half_width / cycles + (terminates(request_) ? bias_percent_of_termination : bias_percent);
+  return result;
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,124 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "run/sampled_time.h"
+
+#include <vrpipe/component/error.h>
+#include <vrpipe/component/statistic.h>
+#include <vrpipe/pipeline/counts.h>
+#include <vrpipe/pipeline/frame.h>
+#include <vrpipe/pipeline/framebuffer.h>
+#include <vrpipe/pipeline/slots/behaviour.h>
+#include <vrpipe/platforms/simulation.h>
+
+namespace vrpipe {
+
+class Gpu;
+class UntimedGpu;
+
+/// How far a frame has come in a GPU, and with what work, by the counters of its units.
+class FrameProgress {
+ public:
+  explicit FrameProgress(const UntimedGpu& gpu);
+  explicit FrameProgress(const Gpu& gpu);
+
+  std::uint64_t splats() const { return sum(splats_); }     ///< that DRAW has issued
+  std::uint64_t rasterized() const { return sum(quads_); }  ///< quads
+  /// What all units count.
+  Counts counts() const;
+  SampledWork work() const;
+
+ private:
+  using Counters = std::vector<const Counter*>;
+  void add(const std::string& slot, const Behaviour& behaviour);
+  static std::uint64_t sum(const Counters& counters);
+  std::vector<const Behaviour*> behaviours_;
+  Counters splats_, quads_;
+  std::array<Counters, counted_work_kinds> work_;
+};
+
+/// The time of a frame by windows of it that are simulated at `cycle` while the frame is drawn without time: each on the
+/// framebuffer, and with the contents of caches, that all before it has left, and with a stretch before it in which the pipeline
+/// fills. The first is from the beginning on, the last to the end; the others are at random places, one in each of as many strata,
+/// of about equal numbers of quads.
+class FrameSampler {
+ public:
+  /// Why a run, or that of a frame, cannot be sampled; none if it can.
+  static std::optional<UserError> obstacle(const RunRequest& request);
+  static std::optional<UserError> obstacle(const Frame& frame);
+  /// Windows that a frame has where nobody says how many.
+  static std::uint64_t usual_windows(const RunRequest& request);
+  /// Of which half the interval is, by experience, so many percent; none if it is never as narrow.
+  static std::optional<std::uint64_t> windows_for(const RunRequest& request, double error_percent);
+  /// After so many were not near enough; at most four times as many.
+  static std::uint64_t more_windows(const RunRequest& request, std::uint64_t windows, double half_interval_percent,
+                                    double error_percent);
+
+  /// Both outlive it.
+  /// @param request  at fidelity `cycle`, with a sampling
+  FrameSampler(const RunRequest& request, const Frame& frame);
+  /// Whether windows are less than half of the frame.
+  bool is_worth_while() const;
+
+  /// Before the run of a GPU without time, which outlives this.
+  void begin(const UntimedGpu& gpu, const Framebuffer& framebuffer);
+  /// A vertex warp has been drawn.
+  void passed();
+  /// After the run.
+  void end();
+  struct Result {
+    std::uint64_t cycles = 0;
+    SamplingReport report;
+  };
+  /// Then; none if the frame ended before a window did.
+  std::optional<Result> result() const;
+
+ private:
+  /// The course of the frame without time.
+  struct Step {
+    std::uint64_t splats = 0, primitives = 0;
+    double quads = 0;  ///< rasterised
+    SampledWork work{};
+  };
+  struct Window {
+    std::uint32_t splat = 0;        ///< with which warming up begins
+    std::uint32_t stratum_end = 0;  ///< splat
+    double from = 0, to = 0;        ///< quads rasterised before it and its end, in the course without time
+    double cycles = 0;
+  };
+  /// Since it began to warm up.
+  struct Measured {
+    std::uint64_t primitives_from = 0, primitives_to = 0;
+    double cycle_from = 0, cycle_to = 0;
+  };
+  void take_step();
+  void simulate(Window& window);
+  Measured measure(const Frame& part, double from, bool to_end);
+  void find_in_course();
+  void find_busiest();
+  double quads_at_primitive(std::uint64_t primitive) const;
+  double quads_at_splat(std::uint32_t splat) const;
+  SampledWork work_between(double from, double to) const;
+
+  RunRequest request_;
+  const Frame& frame_;
+  const double warm_up_quads_;
+  double estimated_quads_ = 0;
+  std::vector<Window> windows_;
+  std::size_t next_ = 0;  ///< window
+  const UntimedGpu* gpu_ = nullptr;
+  const Framebuffer* drawn_ = nullptr;
+  std::optional<FrameProgress> progress_;
+  std::vector<Step> steps_;
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> primitives_;  ///< issued before a window and its end, by window
+  Framebuffer own_;
+  bool is_whole_ = true;               ///< every window was in the frame
+  double measured_ = 0, warm_up_ = 0;  ///< cycles
+};
+
+}  // namespace vrpipe
