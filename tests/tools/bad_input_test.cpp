@@ -192,8 +192,9 @@ TEST_F(BadInput, Machines) {
 TEST_F(BadInput, NamesLikeNoOther) {
   for (const auto& [arguments, parts] : std::vector<std::pair<std::vector<std::string>, std::vector<std::string>>>{
            {{"run", "--unit", "foo=pairing"}, {"'foo'", "no such slot; ", "`vrpipe units` lists all"}},
-           {{"run", "--log", "foo"}, {"'foo'", "no such unit; `vrpipe units` lists all"}},
-           {{"accuracy", "--quick", "--at-cycle", "foo"}, {"'foo'", "has none; `vrpipe units` lists all"}},
+           {{"run", "--log", "foo"}, {"'foo'", "no such unit; there are draw, ", "`vrpipe units` lists all"}},
+           {{"accuracy", "--quick", "--at-cycle", "foo"},
+            {"'foo'", "has none; there are draw, ", "`vrpipe units` lists all"}},
            {{"run", "--platform", "foo"}, {"'foo'", "no such platform; there are agx-orin, "}},
            {{"convert", "nofile", "x.ply"}, {"no such file; check the path; of built-in scenes there are builtin:"}},
            {{"run", "--scene", "builtin:"}, {"(builtin:)", "there is none of that name; there are builtin:"}},
