@@ -286,6 +286,7 @@ FrameSampler::Measured FrameSampler::measure(const Frame& part, double from, boo
       return now + looks_every;
     });
     const auto end = static_cast<double>(gpu.run(nullptr));
+    kernel_events_ += gpu.clock().activations();
     if (from > 0) measured.cycle_from = (in_from.cycle() + out_from.cycle()) / 2;
     measured.cycle_to = to_end ? end : (in_to.cycle() + out_to.cycle()) / 2;
     is_whole_ = is_whole_ && out_from.has_been() && (to_end || out_to.has_been());
@@ -391,6 +392,7 @@ std::optional<FrameSampler::Result> FrameSampler::result() const {
   const double cycles = middle.cycles + head.cycles + tail.cycles;
   Result result;
   result.cycles = static_cast<std::uint64_t>(cycles + 0.5);
+  result.kernel_events = kernel_events_;
   result.report.windows = windows_.size();
   result.report.measured_share = measured_ / cycles;
   result.report.warm_up_share = warm_up_ / cycles;

@@ -73,6 +73,7 @@ class FrameSampler {
   void end();
   struct Result {
     std::uint64_t cycles = 0;
+    std::uint64_t kernel_events = 0;  ///< of all windows
     SamplingReport report;
   };
   /// Then; none if the frame ended before a window did.
@@ -119,6 +120,7 @@ class FrameSampler {
   Framebuffer own_;
   bool is_whole_ = true;               ///< every window was in the frame
   double measured_ = 0, warm_up_ = 0;  ///< cycles
+  std::uint64_t kernel_events_ = 0;
 };
 
 }  // namespace vrpipe

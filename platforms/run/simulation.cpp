@@ -659,6 +659,7 @@ std::optional<RunResult> simulate_windows(const RunRequest& request, const Frame
   result.sampling = sampled->report;
   result.sampling->seed = request.sampling->seed;
   result.cycles = sampled->cycles;
+  result.kernel_events = sampled->kernel_events;
   result.milliseconds = static_cast<double>(sampled->cycles) / (request.platform->frequency_mhz * 1e3);
   result.expected_error_percent = sampled->report.half_interval_percent;
   result.result_hash = hash_of(result);

@@ -269,7 +269,7 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, con
     json["sampling"] = sampling_json(*run.sampling);
     // What only the time of the whole frame tells.
     if (run.sampling->windows != 0) {
-      for (const char* const key : {"bottleneck", "utilization", "units", "kernel_events", "stopped"}) json.erase(key);
+      for (const char* const key : {"bottleneck", "utilization", "units", "stopped"}) json.erase(key);
     }
   }
   if (run.intervals) json["intervals"] = intervals_json(*run.intervals);
