@@ -64,7 +64,7 @@ std::string suggestion(const std::string& name, const std::vector<std::string>& 
   std::string all;
   for (const std::string& each : known) {
     if (std::find(named.begin(), named.end(), each) != named.end()) continue;
-    if (all.size() < most_letters) all += (named.empty() ? "" : ", ") + prefix + each;
+    if (all.size() < most_letters) all += (named.empty() ? "" : ", ") + each;
     named.push_back(each);
   }
   const bool is_short = all.size() < most_letters;
@@ -76,7 +76,7 @@ std::string suggestion(const std::string& name, const std::vector<std::string>& 
   } else if (is_short && (near.empty() || lists.empty())) {
     add((near.empty() ? "there are " : "There are ") + all);
   } else if (lists.empty()) {
-    add(std::string(near.empty() ? "there are " : "There are ") + std::to_string(named.size()) + ", such as " + prefix +
+    add(std::string(near.empty() ? "there are " : "There are ") + std::to_string(named.size()) + ", such as " +
         known.front());
   }
   if (!lists.empty()) add(lists);

@@ -162,7 +162,7 @@ TEST(Suggestion, NamesWhatIsNearAndElseWhatThereIs) {
   EXPECT_EQ(suggestion("lgeo", names), "did you mean lego? There are lego, room");
   EXPECT_EQ(suggestion("foo", names), "there are lego, room");
   EXPECT_EQ(suggestion("lgeo", names, "`list` lists all", "a:"), "did you mean a:lego? `list` lists all");
-  EXPECT_EQ(suggestion("foo", names, "`list` lists all", "a:"), "there are a:lego, a:room; `list` lists all");
+  EXPECT_EQ(suggestion("foo", names, "`list` lists all", "a:"), "there are lego, room; `list` lists all");
   EXPECT_EQ(suggestion("foo", {"lego", "room", "lego"}), "there are lego, room");
   std::vector<std::string> many{"something"};
   for (int i = 1; i < 100; ++i) many.push_back("something" + std::to_string(i));

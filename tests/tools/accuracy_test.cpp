@@ -771,7 +771,7 @@ TEST_F(Accuracy, RefusesBadInputAndWritesNothing) {
       {{"--set", "preprocess.opacity_compensation=on"}, {"preprocess.opacity_compensation", ".spl"}},
       {{"--set", "preprocess.sh_degree=4"}, {"preprocess.sh_degree", "0 to 3"}},
       {{"--set", "preprocess.depth_key_bits=20"}, {"'20'", "32, 24, 16, 12"}},
-      {{"--set", "preprocess.sh=1"}, {"there are preprocess.sh_degree, "}},
+      {{"--set", "preprocess.sh=1"}, {"there are sh_degree, "}},
       {{"--set", "preproces.sh_degree=1"}, {"did you mean preprocess?"}}};
   const std::vector<std::string> before = files();
   for (const auto& [options, parts] : cases) {

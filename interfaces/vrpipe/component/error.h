@@ -43,7 +43,7 @@ std::string near_name(const std::string& name, const std::vector<std::string>& k
 
 /// What to do about a `name` that is none of those `known`: "did you mean NAME?", where one is near, and which there are.
 /// @param lists   where all are listed, e.g. "`vrpipe units` lists all"; without it they are named here
-/// @param prefix  what stands before each where it is written, e.g. "builtin:"
+/// @param prefix  what stands before the one suggested where it is written, e.g. "builtin:"
 std::string suggestion(const std::string& name, const std::vector<std::string>& known, const std::string& lists = "",
                        const std::string& prefix = "");
 
