@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include <vrpipe/pipeline/counts.h>
 #include <vrpipe/pipeline/surface.h>
 #include <vrpipe/platforms/simulation.h>
 
@@ -37,7 +38,19 @@ class ResultHash {
   std::uint64_t hash_ = 0xcbf29ce484222325ULL;
 };
 
-/// Of a frame that is drawn outside the pipeline.
+/// Of a frame that the pipeline draws.
+inline std::string hash_of(const RunResult& result) {
+  ResultHash hash;
+  for (const CountField& field : Counts::fields()) {
+    const std::uint64_t count = result.counts.*field.value;
+    if (count != 0 || !field.is_rare) hash.add(count);
+  }
+  hash.add(result.cycles.value_or(0));
+  hash.add(result.framebuffer.color);
+  return hash.text();
+}
+
+/// Of one that is drawn outside the pipeline.
 inline std::string hash_of(const std::vector<StatisticReport>& statistics, std::optional<std::uint64_t> cycles,
                            const ColorSurface& image) {
   ResultHash hash;

@@ -1,7 +1,6 @@
 #include <vrpipe/platforms/simulation.h>
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <optional>
 
@@ -10,7 +9,9 @@
 #include "run/frame_sampler.h"
 #include "run/host_timer.h"
 #include "run/outside_pipeline.h"
+#include "run/pipeline_run.h"
 #include "run/result_hash.h"
+#include "run/sampled_run.h"
 #include "run/statistic_sampler.h"
 #include "run/statistics.h"
 
@@ -190,17 +191,6 @@ const Variant& variant_named(const std::string& name) {
 
 namespace {
 
-std::string hash_of(const RunResult& result) {
-  ResultHash hash;
-  for (const CountField& field : Counts::fields()) {
-    const std::uint64_t count = result.counts.*field.value;
-    if (count != 0 || !field.is_rare) hash.add(count);
-  }
-  hash.add(result.cycles.value_or(0));
-  hash.add(result.framebuffer.color);
-  return hash.text();
-}
-
 /// The functional models of all units.
 using BehaviourList = std::vector<Behaviour*>;
 
@@ -241,16 +231,13 @@ bool samples_statistics(const RunRequest& request) {
   return request.observers != nullptr && !request.observers->of_statistics().empty();
 }
 
-/// Throws UserError.
-void check_may_sample(const RunRequest& request) {
-  if (const auto obstacle = FrameSampler::obstacle(request)) throw *obstacle;
-}
-
 void check_may_stop(const RunRequest& request) {
   if (request.stop_at == 0 || request.fidelity == Fidelity::cycle) return;
   throw UserError("cannot stop at a cycle", std::string("fidelity ") + name_of(request.fidelity),
                   "what it has done by a cycle is not what the GPU has", "use cycle");
 }
+
+}  // namespace
 
 void check_sampling_has_time(const RunRequest& request) {
   if (!samples_statistics(request) || (has_time(request.fidelity) && !request.sampling)) return;
@@ -260,6 +247,8 @@ void check_sampling_has_time(const RunRequest& request) {
                                                         : "it has no time",
                   "use lt or cycle");
 }
+
+namespace {
 
 /// What all units count, of the frame or of a draw.
 Counts counts_from(const BehaviourList& behaviours, const CountOf& of) {
@@ -580,6 +569,8 @@ void run_untimed(const Configuration& configuration, std::atomic<float>* progres
   for (const std::string& reason : others->unknown()) result.outside_validated_range.push_back(reason);
 }
 
+}  // namespace
+
 /// At lt. A draw takes at least as long as its busiest resource works, which lt knows; where that never rests, no order of events
 /// matters. What was measured of the rest: benchmarks/lt_errors.
 double expected_error_percent(double occupancy) {
@@ -588,7 +579,7 @@ double expected_error_percent(double occupancy) {
 }
 
 RunResult simulate_pipeline(const RunRequest& request, const Frame& frame, std::atomic<float>* progress,
-                            FrameSampler* sampler = nullptr) {
+                            FrameSampler* sampler) {
   check_sampling_has_time(request);
   check_may_stop(request);
   const Configuration configuration(request, frame);
@@ -616,181 +607,6 @@ RunResult simulate_pipeline(const RunRequest& request, const Frame& frame, std::
   return result;
 }
 
-/// What runs took of which nothing is reported.
-class HostTime {
- public:
-  HostTime& operator+=(const RunResult& result) {
-    host_seconds_ += result.host_seconds;
-    cpu_seconds_ += result.cpu_seconds;
-    return *this;
-  }
-  void add_to(RunResult& result) const {
-    result.host_seconds += host_seconds_;
-    result.cpu_seconds += cpu_seconds_;
-  }
-
- private:
-  double host_seconds_ = 0, cpu_seconds_ = 0;
-};
-
-/// All at `cycle`.
-RunResult simulate_whole(RunRequest request, const Frame& frame, std::atomic<float>* progress) {
-  request.fidelity = Fidelity::cycle;
-  request.units_at_cycle.clear();
-  request.sampling.reset();
-  return simulate_pipeline(request, frame, progress);
-}
-
-/// @param request  that can be sampled, as the frame can
-/// Adds to `in_vain` what it took if nothing came of it.
-std::optional<RunResult> simulate_windows(const RunRequest& request, const Frame& frame, FrameSampler& sampler,
-                                          std::atomic<float>* progress, HostTime& in_vain) {
-  RunRequest functional = request;
-  functional.fidelity = Fidelity::functional;
-  functional.sampling.reset();
-  functional.effects.with.emplace_back("l2.contents");
-  RunResult result = simulate_pipeline(functional, frame, progress, &sampler);
-  const std::optional<FrameSampler::Result> sampled = sampler.result();
-  if (!sampled) {
-    in_vain += result;
-    return std::nullopt;
-  }
-  result.request = request;
-  result.sampling = sampled->report;
-  result.sampling->seed = request.sampling->seed;
-  result.cycles = sampled->cycles;
-  result.kernel_events = sampled->kernel_events;
-  result.milliseconds = static_cast<double>(sampled->cycles) / (request.platform->frequency_mhz * 1e3);
-  result.expected_error_percent = sampled->report.half_interval_percent;
-  result.result_hash = hash_of(result);
-  return result;
-}
-
-RunResult simulate_sampled(const RunRequest& request, const Frame& frame, std::atomic<float>* progress) {
-  check_sampling_has_time(request);
-  check_may_sample(request);
-  if (const auto obstacle = FrameSampler::obstacle(frame)) throw *obstacle;
-  FrameSampler sampler(request, frame);
-  HostTime in_vain;
-  if (sampler.is_worth_while()) {
-    if (auto result = simulate_windows(request, frame, sampler, progress, in_vain)) return std::move(*result);
-  }
-  RunResult result = simulate_whole(request, frame, progress);
-  in_vain.add_to(result);
-  result.request = request;
-  result.sampling.emplace();
-  result.sampling->seed = request.sampling->seed;
-  return result;
-}
-
-/// The cheapest way to cycles within RunRequest::error_percent. What a way took that did not get there counts as well.
-class WayWithin {
- public:
-  WayWithin(const RunRequest& request, const Frame& frame, std::atomic<float>* progress)
-      : request_(request), frame_(frame), progress_(progress) {}
-
-  RunResult go() {
-    std::optional<RunResult> result = by_lt();
-    if (!result) result = by_windows();
-    if (!result) {
-      result = simulate_whole(request_, frame_, progress_);
-      took(*result, "all at cycle");
-    }
-    in_vain_.add_to(*result);
-    return std::move(*result);
-  }
-
- private:
-  void took(RunResult& result, const std::string& why) {
-    because_.push_back(why);
-    result.way = WayReport{fidelity_of(result.request), fmt::format("{}", fmt::join(because_, "; "))};
-    result.request = as_taken(request_, result.way);
-  }
-  std::optional<RunResult> by_lt() {
-    const double least = expected_error_percent(1);
-    if (request_.error_percent < least) {
-      because_.push_back(fmt::format("lt never says less than {:.1f} %", least));
-      return std::nullopt;
-    }
-    RunRequest lt = request_;
-    lt.fidelity = Fidelity::lt;
-    lt.units_at_cycle.clear();
-    lt.sampling.reset();
-    fresh_simulation();
-    RunResult result = simulate_pipeline(lt, frame_, progress_);
-    fresh_simulation();
-    const std::string says = result.expected_error_percent
-                                 ? fmt::format("lt says {:.1f} % of itself", *result.expected_error_percent)
-                                 : "lt does not know how far it is off";
-    if (result.expected_error_percent.value_or(INFINITY) <= request_.error_percent) {
-      took(result, says);
-      return result;
-    }
-    because_.push_back(says);
-    in_vain_ += result;
-    return std::nullopt;
-  }
-
-  std::optional<RunResult> by_windows() {
-    RunRequest sampled = request_;
-    sampled.fidelity = Fidelity::cycle;
-    if (!sampled.sampling) sampled.sampling.emplace();
-    if (FrameSampler::obstacle(sampled) || FrameSampler::obstacle(frame_)) {
-      because_.emplace_back("it cannot be sampled");
-      return std::nullopt;
-    }
-    auto windows = FrameSampler::windows_for(sampled, request_.error_percent);
-    if (!windows) because_.emplace_back("windows are never as near");
-    // Spread differs between frames: what the first windows say of it counts.
-    for (unsigned round = 0; windows && round < 2; ++round) {
-      sampled.sampling->windows = *windows;
-      FrameSampler sampler(sampled, frame_);
-      if (!sampler.is_worth_while()) {
-        because_.push_back(fmt::format("the {} windows that takes are half of the frame", *windows));
-        break;
-      }
-      std::optional<RunResult> result = simulate_windows(sampled, frame_, sampler, progress_, in_vain_);
-      if (!result) {
-        because_.emplace_back("the frame ended before its windows");
-        break;
-      }
-      const double half = result->sampling->half_interval_percent;
-      const std::string are = fmt::format("{} windows are within {:.1f} %", *windows, half);
-      if (half <= request_.error_percent) {
-        took(*result, are);
-        return result;
-      }
-      because_.push_back(are);
-      in_vain_ += *result;
-      windows = FrameSampler::more_windows(sampled, *windows, half, request_.error_percent);
-    }
-    return std::nullopt;
-  }
-
-  const RunRequest& request_;
-  const Frame& frame_;
-  std::atomic<float>* const progress_;
-  std::vector<std::string> because_;
-  HostTime in_vain_;
-};
-
-/// Throws UserError.
-void check_error(const RunRequest& request) {
-  if (request.error_percent == 0) return;
-  const auto refuse = [](const std::string& where, const std::string& why, const std::string& remedy) {
-    throw UserError("cannot ask for an error", where, why, remedy);
-  };
-  if (!(request.error_percent > 0 && request.error_percent <= 100))
-    refuse("--error", fmt::format("{:g} % is not above 0 and up to 100", request.error_percent), "ask for 1%");
-  if (!request.variant.is_of_pipeline())
-    refuse("variant " + request.variant.name, "what is drawn outside the pipeline is at one fidelity",
-           "use --fidelity");
-  if (request.stop_at > 0 || request.observers != nullptr)
-    refuse("--until, --html, --heat-maps", "some ways have no course, and several may be tried", "use --fidelity");
-}
-
-}  // namespace
-
 RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<float>* progress) {
   return simulate(request, *Frame::of(draw, draw_state_of(request)), progress);
 }
@@ -798,7 +614,7 @@ RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<floa
 RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<float>* progress) {
   check_error(request);
   const auto by_the_way = [&] {
-    if (request.error_percent > 0) return WayWithin(request, frame, progress).go();
+    if (request.error_percent > 0) return simulate_within(request, frame, progress);
     if (request.sampling) return simulate_sampled(request, frame, progress);
     return request.variant.is_of_pipeline() ? simulate_pipeline(request, frame, progress)
                                             : simulate_outside_pipeline(request, frame);
@@ -807,11 +623,6 @@ RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<fl
   if (!result.stopped) check_conservation(result.counts);
   if (request.observers != nullptr) request.observers->end(result);
   return result;
-}
-
-bool takes_windows(const RunRequest& request, const Frame& frame) {
-  return request.sampling && !FrameSampler::obstacle(request) && !FrameSampler::obstacle(frame) &&
-         FrameSampler(request, frame).is_worth_while();
 }
 
 namespace {

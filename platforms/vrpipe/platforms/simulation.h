@@ -274,8 +274,8 @@ struct SamplingReport {
   std::uint64_t seed = 0;     ///< of where they are
   double measured_share = 1;  ///< of the cycles: those in windows
   double warm_up_share = 0;   ///< those before them, until each was as the whole frame is there, in the same unit
-  double half_interval_percent =
-      0;  ///< the cycles of `cycle` are so near in `confidence_percent` frames and seeds of 100
+  /// The cycles of `cycle` are so near in `confidence_percent` frames and seeds of 100.
+  double half_interval_percent = 0;
   static constexpr double confidence_percent = 95;
 };
 
