@@ -13,6 +13,7 @@
 #include <vrpipe/model/memory_unit.h>
 #include <vrpipe/platforms/configuration.h>
 #include <vrpipe/platforms/gpu.h>
+#include <vrpipe/platforms/netlist.h>
 
 namespace vrpipe {
 
@@ -147,6 +148,12 @@ std::optional<UserError> FrameSampler::obstacle(const RunRequest& request) {
     return refuse("platform " + request.platform->name,
                   "windows are of one GPC: several do not come as far side by side",
                   "use lt or cycle, or platform.gpcs=1");
+  }
+  Netlist netlist(1);
+  request.platform->wire(netlist);
+  if (!netlist.foreign_memories().empty()) {
+    return refuse("platform " + request.platform->name,
+                  "a memory of another make would be empty at the beginning of each window", "use lt or cycle");
   }
   if (request.sampling && request.sampling->windows != 0 && request.sampling->windows < fewest_windows) {
     return refuse(fmt::format("{} windows", request.sampling->windows), "they say too little of what is between them",

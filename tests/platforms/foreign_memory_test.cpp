@@ -1,5 +1,7 @@
 // A memory of another make in place of the L2 or below it, with times and timers of its own.
 
+#include <stdexcept>
+
 #include <gtest/gtest.h>
 
 #include <vrpipe/component/error.h>
@@ -105,6 +107,18 @@ TEST(ForeignMemory, TakesThePlaceOfTheL2ThoughItsRefreshNeverEnds) {
 }
 
 // As DRAMSys up to 5.1: a response ends with END_RESP alone, and a request is taken after the one before.
+TEST(ForeignMemory, IsNotSampled) {
+  const Platform platform = with_memory(
+      [](const std::string&, unsigned) -> ForeignMemory { throw std::logic_error("nothing is to be elaborated"); });
+  RunRequest request = request_of("baseline");
+  request.platform = &platform;
+  request.sampling.emplace();
+  EXPECT_NE(testing::refusal_of([&] {
+              run(request, testing::random_draw(40, 30, 20, 1));
+            }).find("would be empty at the beginning of each window"),
+            std::string::npos);
+}
+
 TEST(ForeignMemory, MayWaitForEndRespAndTakeOneRequestAtATime) {
   const Draw draw = testing::random_draw(96, 96, 600, 21);
   const RunResult expected = run(request_of("het+qm", Fidelity::functional, strictly), draw);
