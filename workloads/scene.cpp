@@ -222,7 +222,7 @@ GaussianFile open_gaussians(const std::string& scene) {
   std::error_code ignored;
   if (!path.has_extension() && !std::filesystem::exists(path, ignored)) {
     throw UserError("cannot read scene", scene, "no such file",
-                    "check the path; of built-in scenes " +
+                    "check the path, or take a built-in scene: " +
                         suggestion(scene, builtin_scene_names(), "", kBuiltinPrefix));
   }
   refuse_mesh(path.string());

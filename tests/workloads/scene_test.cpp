@@ -226,7 +226,8 @@ TEST_F(SceneFile, UnknownKindsOfFilesAreRefusedWithWhatIsSupported) {
   expect_user_error([&] { load_scene(request_); },
                     {"scene.3ds", "known format", ".ply", ".splat", ".spl", "builtin:NAME"});
   request_.scene = "objct";
-  expect_user_error([&] { load_scene(request_); }, {"no such file", "of built-in scenes there are object, "});
+  expect_user_error([&] { load_scene(request_); },
+                    {"no such file", "or take a built-in scene: did you mean builtin:object?"});
   request_.scene = "builtin:objekt";
   expect_user_error([&] { load_scene(request_); }, {"builtin:object?"});
 }
