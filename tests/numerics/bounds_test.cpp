@@ -48,8 +48,8 @@ double tightest(const Draw& draw, const std::vector<Drawn>& all) {
           const double allowed = channel == 3 ? bound.alpha : bound.color;
           EXPECT_LE(off, allowed) << name_of(all[i].format) << ' ' << all[i].variant << " of case " << i << ", pixel "
                                   << x << ',' << y << " channel " << channel;
-          tight = std::max(tight, off / allowed);
           if (off > allowed) return tight;
+          if (off > 0) tight = std::max(tight, off / allowed);
         }
       }
     }

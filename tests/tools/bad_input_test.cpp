@@ -196,7 +196,8 @@ TEST_F(BadInput, NamesLikeNoOther) {
            {{"accuracy", "--quick", "--at-cycle", "foo"},
             {"'foo'", "has none; there are draw, ", "`vrpipe units` lists all"}},
            {{"run", "--platform", "foo"}, {"'foo'", "no such platform; there are agx-orin, "}},
-           {{"convert", "nofile", "x.ply"}, {"no such file; check the path, or take a built-in scene: there are object, "}},
+           {{"convert", "nofile", "x.ply"},
+            {"no such file; check the path, or take a built-in scene: there are object, "}},
            {{"run", "--scene", "builtin:"}, {"(builtin:)", "there is none of that name; there are object, "}},
            {{"reproduce", "--scene", "foo=good.ply"}, {"(foo=good.ply)", "to put a file in its place; there are "}}}) {
     refused(arguments, parts);
