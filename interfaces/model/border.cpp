@@ -72,8 +72,8 @@ void Border::make_room(const char* who) {
   if (!step_locals())
     throw SimulationFault(who, now(),
                           "an item is offered, and the unit is at rest: it waits for another unit at cycle, which "
-                          "waits for it by way of units at lt; "
-                          "simulate fewer units at cycle, or those between them as well");
+                          "waits for it by way of units at lt; simulate fewer units at cycle, or those between them "
+                          "as well");
 }
 
 void Border::advance_for(Cycle until, const std::function<bool()>& is_enough) {

@@ -161,18 +161,8 @@ Frame Frame::part(std::uint32_t first, std::uint32_t end) const {
   Frame part(width_, height_);
   part.depth_format_ = depth_format_;
   part.splats_ = first;
-  std::uint32_t passed = 0;  // of all splats
-  for (const Command& command : commands_) {
-    if (!command.is_draw) {
-      if (first < passed && passed < end) part.clear(command.clear);
-      continue;
-    }
-    const DrawCall& call = draws_[command.draw];
-    const std::uint32_t from = std::max(first, call.base);
-    const std::uint32_t to = std::min(end, call.base + call.splats);
-    passed = call.base + call.splats;
-    if (from < to) part.draw(call.geometry, call.state, call.name, call.first + (from - call.base), to - from);
-  }
+  const DrawCall& call = draws_.front();
+  if (first < end) part.draw(call.geometry, call.state, call.name, call.first + first, end - first);
   return part;
 }
 

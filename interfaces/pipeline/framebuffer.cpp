@@ -60,11 +60,9 @@ bool DepthStencilSurface::is_as_cleared(std::size_t place) const {
   if (terminated_[place] != 0) return false;
   if (quads_.empty()) return true;
   const std::uint32_t depth = store_depth(format_, static_cast<double>(Clear().depth_value));
-  const auto is_cleared = [depth](const DepthStencilQuad& quad) {
-    return std::all_of(quad.depth.begin(), quad.depth.end(), [depth](std::uint32_t value) { return value == depth; }) &&
-           std::all_of(quad.stencil.begin(), quad.stencil.end(), [](std::uint8_t value) { return value == 0; });
-  };
-  return is_cleared(quads_[place]);
+  const DepthStencilQuad& quad = quads_[place];
+  return std::all_of(quad.depth.begin(), quad.depth.end(), [depth](std::uint32_t value) { return value == depth; }) &&
+         std::all_of(quad.stencil.begin(), quad.stencil.end(), [](std::uint8_t value) { return value == 0; });
 }
 
 void DepthStencilSurface::clear(const Clear& clear, const Placement& placement) {

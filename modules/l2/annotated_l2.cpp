@@ -160,23 +160,16 @@ AnnotatedL2::Wait AnnotatedL2::fetch(const MemoryRequest& access, const LineAcce
 
 Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& from) {
   const bool writes = access.command == tlm::TLM_WRITE_COMMAND;
-  std::uint32_t sectors = 0;
-  SectoredCache::Line line = cache_.hit(access.address, access.bytes, writes, sectors);
   LineAccess done;
-  const bool is_hit = line != SectoredCache::no_line;
-  if (is_hit) {
-    done.line = line;
-    done.sectors = sectors;
-  } else {
-    done = cache_.access(access.address, access.bytes, writes);
-    line = done.line;
-  }
+  done.line = cache_.hit(access.address, access.bytes, writes, done.sectors);
+  const bool is_hit = done.line != SectoredCache::no_line;
+  if (!is_hit) done = cache_.access(access.address, access.bytes, writes);
   behaviour_->looked_up(access, static_cast<unsigned>(__builtin_popcount(done.sectors)),
                         static_cast<unsigned>(__builtin_popcount(done.missed)));
-  const std::uint32_t index = behaviour_->bank_of_line(line);
+  const std::uint32_t index = behaviour_->bank_of_line(done.line);
   Bank& bank = banks_[index];
   Wait wait{arrival, arrival, access.bytes};
-  if (!is_hit || cache_.note(line) > arrival) wait = fetch(access, done, bank, arrival);
+  if (!is_hit || cache_.note(done.line) > arrival) wait = fetch(access, done, bank, arrival);
   const std::uint32_t cycles = behaviour_->bank_cycles(wait.moved);
   const Cycle free_at = occupy(bank, arrival, wait.begin, cycles);
   behaviour_->count_bank(index, wait.moved);

@@ -99,7 +99,7 @@ void Configuration::decide_effects() {
   const FrameFacts facts(contexts_.front());
   const ParameterSet none;
   auto omitted = std::make_shared<OmittedEffects>();
-  const bool has_time = request_.fidelity != Fidelity::functional && request_.fidelity != Fidelity::bound;
+  const bool has_time = vrpipe::has_time(request_.fidelity);
   unsigned observed_links = 0;
   if (request_.observers != nullptr) {
     for (const Link& link : netlist_.links()) observed_links += request_.observers->observes_link(link.name()) ? 1 : 0;

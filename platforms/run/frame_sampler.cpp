@@ -33,20 +33,22 @@ constexpr std::array<CounterName, counted_work_kinds> work_names{{{"raster", "ra
 
 /// Of the course, in quads.
 constexpr double quads_of_step = 2048;
-// Of a window, in quads. Between those that terminate, queues between RASTER and CROP take long to be as full as they are in the
-// whole frame: measured (docs/accuracy.md).
-constexpr double measured_quads = 20000;
-constexpr double warm_up_quads = 20000;
-constexpr double warm_up_quads_of_termination = 80000;
-// Percent, of windows that begin otherwise than the frame goes on, whatever their number: measured (docs/accuracy.md).
-constexpr double bias_percent = 0.3;
-constexpr double bias_percent_of_termination = 1.5;
-// Half the interval times the root of the number of windows, percent: measured (docs/accuracy.md).
-constexpr double spread_percent = 4;
-constexpr double spread_percent_of_termination = 13;
+constexpr double measured_quads = 20000;  ///< of a window
 constexpr std::uint64_t fewest_windows = 16;
 
-bool terminates(const RunRequest& request) { return request.variant.early_termination; }
+/// Of windows, as measured (docs/accuracy.md). Between quads that terminate, queues between RASTER and CROP take long to be as full
+/// as they are in the whole frame.
+struct WindowFacts {
+  double warm_up_quads;
+  double bias_percent;    ///< of windows that begin otherwise than the frame goes on, whatever their number
+  double spread_percent;  ///< half the interval times the root of the number of windows
+  std::uint64_t usual;    ///< windows, where nobody says how many
+};
+constexpr WindowFacts facts_without_termination{20000, 0.3, 4, 24};
+constexpr WindowFacts facts_with_termination{80000, 1.5, 13, 40};
+const WindowFacts& facts_of(const RunRequest& request) {
+  return request.variant.early_termination ? facts_with_termination : facts_without_termination;
+}
 
 /// When a count that is looked at now and then reaches a value.
 class Passing {
@@ -176,19 +178,17 @@ std::optional<UserError> FrameSampler::obstacle(const Frame& frame) {
   return std::nullopt;
 }
 
-std::uint64_t FrameSampler::usual_windows(const RunRequest& request) { return terminates(request) ? 40 : 24; }
-
 std::optional<std::uint64_t> FrameSampler::windows_for(const RunRequest& request, double error_percent) {
-  const double random_percent = error_percent - (terminates(request) ? bias_percent_of_termination : bias_percent);
-  if (random_percent <= 0) return std::nullopt;
-  const double root = (terminates(request) ? spread_percent_of_termination : spread_percent) / random_percent;
+  const WindowFacts& facts = facts_of(request);
+  if (error_percent <= facts.bias_percent) return std::nullopt;
+  const double root = facts.spread_percent / (error_percent - facts.bias_percent);
   // More than there are in any frame are as good as all of these.
   return std::max(fewest_windows, static_cast<std::uint64_t>(std::min(std::ceil(root * root), 1e6)));
 }
 
 std::uint64_t FrameSampler::more_windows(const RunRequest& request, std::uint64_t windows, double half_interval_percent,
                                          double error_percent) {
-  const double bias = terminates(request) ? bias_percent_of_termination : bias_percent;
+  const double bias = facts_of(request).bias_percent;
   // A fifth more, since what they say of their spread is spread as well.
   const double times_as_wide = (half_interval_percent - bias) / (error_percent - bias);
   const double times = 1.2 * times_as_wide * times_as_wide;
@@ -196,9 +196,7 @@ std::uint64_t FrameSampler::more_windows(const RunRequest& request, std::uint64_
 }
 
 FrameSampler::FrameSampler(const RunRequest& request, const Frame& frame)
-    : request_(request),
-      frame_(frame),
-      warm_up_quads_(terminates(request) ? warm_up_quads_of_termination : warm_up_quads) {
+    : request_(request), frame_(frame), warm_up_quads_(facts_of(request).warm_up_quads) {
   request_.sampling.reset();
   request_.observers = nullptr;
   request_.reads_statistics = false;
@@ -214,7 +212,7 @@ FrameSampler::FrameSampler(const RunRequest& request, const Frame& frame)
   const double begin = measured_quads;
   // The estimate may be a third too high without a window that reaches beyond the frame.
   const double end = std::max(begin, 0.97 * estimated_quads_ - 4 * measured_quads);
-  const std::uint64_t strata = request.sampling->windows != 0 ? request.sampling->windows : usual_windows(request);
+  const std::uint64_t strata = request.sampling->windows != 0 ? request.sampling->windows : facts_of(request).usual;
   const double length = (end - begin) / static_cast<double>(strata);
   windows_.push_back({0, splat_at(begin)});
   for (std::uint64_t i = 0; i < strata; ++i) {
@@ -261,7 +259,8 @@ void FrameSampler::simulate(Window& window) {
   window.from = static_cast<double>(progress_->rasterized()) + from;
   window.to = window.from + measured_quads;
   const std::uint64_t primitives = progress_->counts().primitives;
-  primitives_.emplace_back(primitives + measured.primitives_from, primitives + measured.primitives_to);
+  window.primitives_from = primitives + measured.primitives_from;
+  window.primitives_to = primitives + measured.primitives_to;
   measured_ += window.cycles;
   warm_up_ += measured.cycle_from;
 }
@@ -313,8 +312,8 @@ void FrameSampler::end() {
 void FrameSampler::find_in_course() {
   for (std::size_t i = 1; i < windows_.size(); ++i) {
     Window& window = windows_[i];
-    const double from_later = quads_at_primitive(primitives_[i].first) - window.from;
-    const double to_later = quads_at_primitive(primitives_[i].second) - window.to;
+    const double from_later = quads_at_primitive(window.primitives_from) - window.from;
+    const double to_later = quads_at_primitive(window.primitives_to) - window.to;
     const double later = i + 1 == windows_.size() ? from_later : (from_later + to_later) / 2;
     window.from += later;
     window.to += later;
@@ -404,8 +403,7 @@ std::optional<FrameSampler::Result> FrameSampler::result() const {
   result.report.windows = windows_.size();
   result.report.measured_share = measured_ / cycles;
   result.report.warm_up_share = warm_up_ / cycles;
-  result.report.half_interval_percent =
-      100 * middle.half_width / cycles + (terminates(request_) ? bias_percent_of_termination : bias_percent);
+  result.report.half_interval_percent = 100 * middle.half_width / cycles + facts_of(request_).bias_percent;
   return result;
 }
 

@@ -51,8 +51,6 @@ class FrameSampler {
   /// Why a run, or that of a frame, cannot be sampled; none if it can.
   static std::optional<UserError> obstacle(const RunRequest& request);
   static std::optional<UserError> obstacle(const Frame& frame);
-  /// Windows that a frame has where nobody says how many.
-  static std::uint64_t usual_windows(const RunRequest& request);
   /// Of which half the interval is, by experience, so many percent; none if it is never as narrow.
   static std::optional<std::uint64_t> windows_for(const RunRequest& request, double error_percent);
   /// After so many were not near enough; at most four times as many.
@@ -90,6 +88,7 @@ class FrameSampler {
     std::uint32_t splat = 0;        ///< with which warming up begins
     std::uint32_t stratum_end = 0;  ///< splat
     double from = 0, to = 0;        ///< quads rasterised before it and its end, in the course without time
+    std::uint64_t primitives_from = 0, primitives_to = 0;  ///< issued before these
     double cycles = 0;
   };
   /// Since it began to warm up.
@@ -116,7 +115,6 @@ class FrameSampler {
   const Framebuffer* drawn_ = nullptr;
   std::optional<FrameProgress> progress_;
   std::vector<Step> steps_;
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> primitives_;  ///< issued before a window and its end, by window
   Framebuffer own_;
   bool is_whole_ = true;               ///< every window was in the frame
   double measured_ = 0, warm_up_ = 0;  ///< cycles

@@ -51,14 +51,21 @@ const std::vector<Fidelity>& fidelities() {
   return all;
 }
 
-Fidelity fidelity_named(const std::string& name) {
-  std::vector<std::string> names;
+namespace {
+/// @param names  all that may stand there
+Fidelity fidelity_among(const std::string& name, const std::vector<std::string>& names) {
   for (const Fidelity fidelity : fidelities()) {
     if (name == name_of(fidelity)) return fidelity;
-    names.emplace_back(name_of(fidelity));
   }
   throw UserError("unknown fidelity '" + name + "'", "--fidelity", "this build has no such fidelity",
                   suggestion(name, names));
+}
+}  // namespace
+
+Fidelity fidelity_named(const std::string& name) {
+  std::vector<std::string> names = fidelity_names();
+  names.pop_back();  // which is none of a whole run's
+  return fidelity_among(name, names);
 }
 
 std::vector<std::string> fidelity_names() {
@@ -73,20 +80,16 @@ void choose_fidelity(RunRequest& request, const std::string& text) {
   boost::split(words, text, boost::is_any_of(","));
   request.units_at_cycle.clear();
   request.sampling.reset();
-  if (text == sampled_name) {
+  if (words.front() == sampled_name) {
+    if (words.size() > 1) {
+      throw UserError("unknown fidelity '" + text + "'", "--fidelity", "a sampled run has no units at another fidelity",
+                      "write sampled alone");
+    }
     request.fidelity = Fidelity::cycle;
     request.sampling.emplace();
     return;
   }
-  const std::vector<std::string> names = fidelity_names();
-  if (std::find(names.begin(), names.end(), words.front()) == names.end()) {
-    throw UserError("unknown fidelity '" + words.front() + "'", "--fidelity", "this build has no such fidelity",
-                    suggestion(words.front(), names));
-  }
-  if (words.front() == sampled_name)
-    throw UserError("unknown fidelity '" + text + "'", "--fidelity", "a sampled run has no units at another fidelity",
-                    "write sampled alone");
-  request.fidelity = fidelity_named(words.front());
+  request.fidelity = fidelity_among(words.front(), fidelity_names());
   for (auto word = words.begin() + 1; word != words.end(); ++word) {
     const std::size_t sign = word->find('=');
     if (request.fidelity != Fidelity::lt || sign == std::string::npos || word->substr(sign + 1) != "cycle") {
@@ -96,6 +99,9 @@ void choose_fidelity(RunRequest& request, const std::string& text) {
     request.units_at_cycle.push_back(word->substr(0, sign));
   }
 }
+
+bool has_time(Fidelity fidelity) { return fidelity != Fidelity::functional && fidelity != Fidelity::bound; }
+bool has_course(const RunRequest& request) { return has_time(request.fidelity) && !request.sampling; }
 
 RunRequest as_taken(const RunRequest& request, const std::optional<WayReport>& way) {
   RunRequest taken = request;
@@ -225,8 +231,6 @@ void add_statistics(const Gpu& gpu, Statistics& statistics) {
   }
 }
 
-bool has_time(Fidelity fidelity) { return fidelity != Fidelity::functional && fidelity != Fidelity::bound; }
-
 bool samples_statistics(const RunRequest& request) {
   return request.observers != nullptr && !request.observers->of_statistics().empty();
 }
@@ -240,7 +244,7 @@ void check_may_stop(const RunRequest& request) {
 }  // namespace
 
 void check_sampling_has_time(const RunRequest& request) {
-  if (!samples_statistics(request) || (has_time(request.fidelity) && !request.sampling)) return;
+  if (!samples_statistics(request) || has_course(request)) return;
   throw UserError("cannot sample statistics", "--fidelity " + fidelity_of(request),
                   request.sampling                      ? "most of its course has no time"
                   : request.fidelity == Fidelity::bound ? "its cycles follow from all the work, no work has a cycle"

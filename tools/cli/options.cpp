@@ -235,15 +235,15 @@ void SimulationArguments::declare_rules(Arguments& arguments) {
       .add_option("--format", format_, "NAME",
                   "colour target: rgba8, srgb8, rgba16f, rgba16 (UNORM) or rgba32f\n(default: rgba16f)", rules_group)
       .default_text = "rgba16f";
-  arguments.find("--format")->check = [](const std::string& text) { color_format_named(text); };
+  arguments.find("--format")->check = color_format_named;
   arguments
       .add_option("--termination", termination_, "NAME",
                   "when a termination bit counts: paper (once its update has travelled) or\n"
                   "strict (order alone decides) (default: paper)",
                   rules_group)
       .default_text = "paper";
-  arguments.find("--termination")->check = [](const std::string& text) { termination_named(text); };
-  arguments.find("--effects")->check = [](const std::string& text) { EffectChoice::parse(text); };
+  arguments.find("--termination")->check = termination_named;
+  arguments.find("--effects")->check = EffectChoice::parse;
 }
 
 void SimulationArguments::declare_study(Arguments& arguments) {
@@ -326,12 +326,12 @@ void SimulationArguments::declare_whole_frames(Arguments& arguments) {
   arguments
       .add_option("--multi-pass", passes_, "N", "passes of the path multi-pass (default: 4; 1: without it)",
                   scene_group)
-      .check = [](const std::string& text) { passes_of(text); };
+      .check = passes_of;
   arguments.add_option(ViewsChoice::option, views_, "N|all",
                        "the scene from N cameras evenly spaced among those of --camera FILE, or from\n"
                        "all of them; without a file, from N round the scene: how frames are distributed",
                        scene_group);
-  arguments.find(ViewsChoice::option)->check = [](const std::string& text) { view_count(text); };
+  arguments.find(ViewsChoice::option)->check = view_count;
   arguments.add_flag("--imitation", imitation_,
                      "one more path: the baseline as the paper measured energy with it, termination imitated\n"
                      "by a stencil that counts, merging by the shader (docs/energy.md)",
@@ -357,7 +357,7 @@ void SimulationArguments::declare_platform(Arguments& arguments) {
       .add_option("--platform", platform_, "NAME",
                   "the GPU (default: " + platforms().front().name + "; `vrpipe platforms` lists them)", machine_group)
       .default_text = platforms().front().name;
-  arguments.find("--platform")->check = [](const std::string& text) { platform_named(text); };
+  arguments.find("--platform")->check = platform_named;
 }
 
 void SimulationArguments::declare_changes(Arguments& arguments) {
@@ -453,8 +453,8 @@ void SimulationArguments::declare_frames(Arguments& arguments) {
                        "last a draw that sets the stencil where a pixel has terminated (default: 1;\n"
                        "docs/early-termination.md)",
                        scene_group);
-  arguments.find("--multi-pass")->check = [](const std::string& text) { passes_of(text); };
-  arguments.find("--draws")->check = [](const std::string& text) { draws_of(text); };
+  arguments.find("--multi-pass")->check = passes_of;
+  arguments.find("--draws")->check = draws_of;
 }
 
 void SimulationArguments::declare_views(Arguments& arguments) {
@@ -464,7 +464,7 @@ void SimulationArguments::declare_views(Arguments& arguments) {
                        "and early-termination ratios are distributed. Goes on where it was\n"
                        "interrupted (docs/cameras.md)",
                        scene_group);
-  arguments.find(ViewsChoice::option)->check = [](const std::string& text) { view_count(text); };
+  arguments.find(ViewsChoice::option)->check = view_count;
   arguments.add_option(ViewsChoice::journal_option, journal_, "FILE",
                        "where --views stores what is done, and goes on from; it stays (default: a\n"
                        "file in the user's cache folder, removed at the end)",

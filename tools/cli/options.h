@@ -44,9 +44,9 @@ class SimulationArguments {
   MachineJob resolve_machine(const Invocation& invocation, const Platform* platform = nullptr) const;
   /// Those of a command that draws a scene in software as well, with kernels that it may name and set.
   void declare_whole_frames(Arguments& arguments);
-  /// --frame and --multi-pass, for commands that draw frames of several draws as well.
-  /// --error and --seed.
+  /// --error and --seed, for commands that may simulate a part of the frame alone.
   void declare_error(Arguments& arguments);
+  /// --frame and --multi-pass, for commands that draw frames of several draws as well.
   void declare_frames(Arguments& arguments);
   /// --views and --journal, for commands that draw a scene from many cameras as well.
   void declare_views(Arguments& arguments);
@@ -85,16 +85,14 @@ class SimulationArguments {
   static std::vector<Variant> variants_drawn_by(const SimulationJob& job, const std::vector<std::string>& of_study);
   void check_outside(const SimulationJob& job, const std::vector<Variant>& variants) const;
   void check_explanation(const EffectChoice& effects) const;
+  void choose_error(RunRequest& request) const;
   /// Null if energy is not asked for; throws UserError.
   std::shared_ptr<const EnergyTable> energies(const Platform& platform) const;
 
   Values meshes_;
   Values scene_, frame_, draws_, passes_, size_, camera_, eye_, look_at_, up_, fovy_, orthographic_;
   Values platform_, settings_, variant_, definitions_, units_, plugins_;
-  void choose_error(RunRequest& request) const;
-
-  Values error_, seed_;
-  Values fidelity_, effects_, format_, termination_;
+  Values fidelity_, error_, seed_, effects_, format_, termination_;
   Values views_, journal_, relative_to_;
   bool compares_any_ = false;
   bool takes_kernels_ = false;

@@ -34,11 +34,6 @@ std::vector<std::string> default_statistics(const RunRequest& request) {
   return names;
 }
 
-/// Whether it is known what is when.
-bool has_course(const RunRequest& request) {
-  return request.fidelity != Fidelity::functional && request.fidelity != Fidelity::bound && !request.sampling;
-}
-
 void check_has_time(const SimulationJob& job, const std::string& option) {
   if (has_course(job.requests.front())) return;
   const RunRequest& request = job.requests.front();

@@ -242,9 +242,6 @@ bool can_be(const RunRequest& request) {
   return true;
 }
 
-bool is_finest(const RunRequest& request) {
-  return request.fidelity == finest_fidelity(request.variant) && !request.sampling;
-}
 bool is_of_pipeline(const RunRequest& request) { return request.variant.is_of_pipeline(); }
 
 /// The runs of the fidelity ladder: for each variant from the most exact fidelity on, so that its image is there to

@@ -46,6 +46,10 @@ std::string finest_fidelity_text(const std::vector<RunResult>& runs) {
   return first == runs.end() ? vrpipe::name_of(finest) : fidelity_of(first->request);
 }
 
+bool is_finest(const RunRequest& request) {
+  return request.fidelity == finest_fidelity(request.variant) && !request.sampling;
+}
+
 bool are_of_several_platforms(const std::vector<RunResult>& runs) {
   return std::any_of(runs.begin(), runs.end(),
                      [&](const RunResult& run) { return run.request.platform != runs.front().request.platform; });

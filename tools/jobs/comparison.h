@@ -21,6 +21,9 @@ Fidelity finest_fidelity_of(const std::vector<RunResult>& runs);
 /// What `--fidelity` says for the first that has it.
 std::string finest_fidelity_text(const std::vector<RunResult>& runs);
 
+/// Whether nothing is more exact: at the finest fidelity that the variant has, and all of the frame.
+bool is_finest(const RunRequest& request);
+
 /// Whether runs are of several platforms.
 bool are_of_several_platforms(const std::vector<RunResult>& runs);
 

@@ -80,11 +80,8 @@ void EventLog::attach(const RunRequest& request, Observers& observers) {
 }
 
 void EventLog::check_windows(Cycle cycles) const {
-  for (const Choice& choice : choices_) {
-    if (cycles > choice.window.from) continue;
-    throw UserError("nothing to log", fmt::format("{} {}@{}:", option, choice.unit, choice.window.from),
-                    fmt::format("the run ends after {} cycles", cycles), "begin earlier");
-  }
+  for (const Choice& choice : choices_)
+    choice.window.check_begun(cycles, "nothing to log", fmt::format("{} {}", option, choice.unit));
 }
 
 void EventLog::open() {

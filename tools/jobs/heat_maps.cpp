@@ -17,8 +17,6 @@ constexpr const char* merged_name = "merged";
 constexpr const char* fate_names[fragment_fates] = {"rasterized", "terminated", merged_name, "blended"};
 constexpr const char* cycle_name = "termination_cycle";
 
-bool has_time(Fidelity fidelity) { return fidelity != Fidelity::functional && fidelity != Fidelity::bound; }
-
 std::vector<std::string> names_of(bool timed) {
   std::vector<std::string> names(std::begin(fate_names), std::end(fate_names));
   if (timed) names.emplace_back(cycle_name);
@@ -82,8 +80,7 @@ nlohmann::ordered_json legend(const std::vector<NamedChannel>& channels) {
 }  // namespace
 
 HeatMaps::HeatMaps(std::uint32_t width, std::uint32_t height, const RunRequest& request)
-    // Of a run in windows, what is seen has no time.
-    : has_time_(!request.sampling && has_time(request.fidelity)),
+    : has_time_(has_course(request)),
       is_of_pipeline_(request.variant.is_of_pipeline()),
       fates_(width, height),
       cycles_(width, height) {}

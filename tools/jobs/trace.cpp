@@ -230,10 +230,7 @@ void Trace::begin(Counter& counter) {
 
 void Trace::end(const RunResult& result) {
   const Cycle cycles = result.cycles.value_or(0);
-  if (cycles <= window_.from) {
-    throw UserError("nothing to trace", fmt::format("{} {}@{}:", option, path_.string(), window_.from),
-                    fmt::format("the run ends after {} cycles", cycles), "begin earlier");
-  }
+  window_.check_begun(cycles, "nothing to trace", fmt::format("{} {}", option, path_.string()));
   for (auto& [name, unit] : units_) {
     enter(unit, unit.state, std::max(unit.since, cycles));
     for (Slice& slice : unit.held) slice.until = std::min(slice.until, cycles);

@@ -9,6 +9,7 @@
 #include <vrpipe/arithmetic/blend.h>
 #include <vrpipe/component/printable.h>
 
+#include "jobs/comparison.h"
 #include "output/effects_report.h"
 #include "output/report.h"
 #include "output/text_table.h"
@@ -166,9 +167,6 @@ std::vector<std::string> levels_of(const AccuracyResult& result) {
 
 FidelityRange range_of(const AccuracyResult& result, const std::string& fidelity) {
   FidelityRange range;
-  const auto is_finest = [](const RunRequest& request) {
-    return request.fidelity == finest_fidelity(request.variant) && !request.sampling;
-  };
   for (const FidelityLevel& level : result.fidelity) {
     if (fidelity_of(level.run.request) != fidelity) continue;
     range.is_reference = range.is_reference && is_finest(level.run.request);
@@ -218,9 +216,8 @@ std::string most_exact_text(const AccuracyResult& result) {
   for (auto fidelity = fidelities().rbegin(); fidelity != fidelities().rend(); ++fidelity) {
     std::vector<std::string> names;
     for (const FidelityLevel& level : result.fidelity) {
-      const Variant& variant = level.run.request.variant;
-      const bool is_finest = level.run.request.fidelity == finest_fidelity(variant) && !level.run.request.sampling;
-      if (is_finest && level.run.request.fidelity == *fidelity) names.push_back(variant.name);
+      const RunRequest& request = level.run.request;
+      if (is_finest(request) && request.fidelity == *fidelity) names.push_back(request.variant.name);
     }
     if (names.empty()) continue;
     text += text.empty() ? vrpipe::name_of(*fidelity)

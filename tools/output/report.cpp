@@ -406,8 +406,7 @@ std::string sampling_text(const std::vector<RunResult>& runs) {
     }
     text += fmt::format(
         "{}sampled: {} cycles, {:g} of 100 within +-{:.1f} %, {} windows with {:.1f} % of them and {:.1f} % to warm "
-        "up, "
-        "seed {}\n",
+        "up, seed {}\n",
         name, grouped(*run.cycles), SamplingReport::confidence_percent, sampling.half_interval_percent,
         sampling.windows, 100 * sampling.measured_share, 100 * sampling.warm_up_share, sampling.seed);
   }

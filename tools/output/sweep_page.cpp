@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "output/machines_text.h"
 #include "output/page_parts.h"
 #include "output/sweep_report.h"
 
@@ -59,9 +58,7 @@ std::string facts(const SweepResult& result, const CommonScene& scene) {
     if (!html.empty()) text += fmt::format("<dt>{}</dt><dd>{}</dd>\n", name, html);
   };
   add("drawn", html_escaped(scene_line(scene)));
-  std::vector<std::string> axes;
-  for (const StudyAxis& axis : result.study.axes) axes.push_back(axis.name);
-  std::istringstream machines(machines_text(result.machines, result.preprocessing, result.passes, TextStyle(), axes));
+  std::istringstream machines(study_machines_text(result, TextStyle()));
   for (std::string line; std::getline(machines, line);) add("simulated", html_escaped(line));
   std::string options;
   for (const auto& [name, texts] : result.options) {

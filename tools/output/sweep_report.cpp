@@ -189,6 +189,12 @@ std::string points_line(const Study& study) {
                             same == 1 ? "1 is the same as another" : grouped(same) + " are the same as others");
 }
 
+std::string study_machines_text(const SweepResult& result, const TextStyle& style) {
+  std::vector<std::string> axes;
+  for (const StudyAxis& axis : result.study.axes) axes.push_back(axis.name);
+  return machines_text(result.machines, result.preprocessing, result.passes, style, axes);
+}
+
 std::string scene_line(const CommonScene& scene) {
   std::string text = scene.name.value_or("");
   if (scene.size) text += fmt::format("{}{}x{}", text.empty() ? "" : ", ", scene.size->first, scene.size->second);
@@ -211,11 +217,9 @@ bool has_speedups(const SweepTable& table) {
 std::string sweep_text(const SweepFindings& findings, const TextStyle& style) {
   const SweepResult& result = findings.result;
   const Study& study = result.study;
-  std::vector<std::string> axes;
-  for (const StudyAxis& axis : study.axes) axes.push_back(axis.name);
   std::string text;
   if (const std::string scene = scene_line(findings.scene); !scene.empty()) text += style.bold(printable(scene)) + "\n";
-  text += machines_text(result.machines, result.preprocessing, result.passes, style, axes) + "\n";
+  text += study_machines_text(result, style) + "\n";
   text += style.bold(points_line(study));
   for (const StudyAxis& axis : study.axes) text += fmt::format("\n  {}: {}", printable(axis.name), axis.values.size());
   text += "\n\n" + points_text(findings, style) + effects_text(findings, style) + idle_text(findings) +

@@ -33,6 +33,8 @@ Json sweep_json(const SweepFindings& findings);
 std::string reference_text(const Study& study);
 /// How many points there are, and of how many combinations.
 std::string points_line(const Study& study);
+/// machines_text() of the points, but for what axes say.
+std::string study_machines_text(const SweepResult& result, const TextStyle& style);
 /// Scene and size, as far as all points have the same; else empty.
 std::string scene_line(const CommonScene& scene);
 /// Of an axis, what it changes, in words: "1.24x", or "no effect".

@@ -88,7 +88,7 @@ class Frame {
   const DrawCall& draw_call(DrawIndex draw) const { return draws_[draw]; }
   /// Whether a mark clears all that draws of the frame keep in the depth-stencil target.
   bool clears_depth_stencil(Mark mark) const;
-  /// Of the splats of all draws, those from `first` to `end` - 1, with the clears between them, called as here. The stencil is not preset.
+  /// Of a frame of one draw: its splats from `first` to `end` - 1, called as here. The stencil is not preset.
   Frame part(std::uint32_t first, std::uint32_t end) const;
   /// Changes the state of every draw.
   void change_states(const std::function<void(DrawState&)>& change);

@@ -154,6 +154,10 @@ struct WayReport {
 };
 /// A request as its run has taken it: of one that was asked for an error, at the fidelity of its way.
 RunRequest as_taken(const RunRequest& request, const std::optional<WayReport>& way);
+/// Whether work has cycles.
+bool has_time(Fidelity fidelity);
+/// Whether it is known of a run what is when, from its beginning to its end.
+bool has_course(const RunRequest& request);
 /// GPCs of the platform, by its settings, those of the variant and of the run. Throws UserError for a number that cannot be.
 unsigned gpcs_of(const RunRequest& request);
 /// The GPC that owns a screen tile, as the platform's crossbar has it; 0 where there is one GPC.
