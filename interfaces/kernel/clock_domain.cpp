@@ -176,26 +176,34 @@ inline void ClockDomain::tick(Clocked& unit, Cycle cycle, Cycle& due) {
 
 bool ClockDomain::tick_due(Cycle cycle) {
   // A wake-up in this cycle is for a later one: who is due is known before any of them ticks.
-  std::uint64_t active = take_due(due_.data(), std::min(at_a_time, due_.size()), cycle);
-  bool any = active != 0;
-  for (std::size_t first = at_a_time; first < due_.size(); first += at_a_time) {
-    std::uint64_t& further = active_[first / at_a_time];
-    further = take_due(due_.data() + first, std::min(at_a_time, due_.size() - first), cycle);
-    any = any || further != 0;
-  }
-  if (!any) return false;
+  const std::size_t count = due_.size();
+  const std::uint64_t active = take_due(due_.data(), std::min(at_a_time, count), cycle);
+  const bool any_further = count > at_a_time && take_further_due(cycle);
+  if (active == 0 && !any_further) return false;
   now_ = cycle;
-  for (std::size_t first = 0;;) {
-    Cycle* const due = due_.data() + first;
-    Clocked* const* const units = units_.data() + first;
-    for (; active != 0; active &= active - 1) {
-      const auto place = static_cast<std::size_t>(__builtin_ctzll(active));
-      tick(*units[place], cycle, due[place]);
-    }
-    first += at_a_time;
-    if (first >= due_.size()) return true;
-    active = active_[first / at_a_time];
+  tick_active(active, 0, cycle);
+  for (std::size_t first = at_a_time; any_further && first < count; first += at_a_time)
+    tick_active(active_[first / at_a_time], first, cycle);
+  return true;
+}
+
+inline void ClockDomain::tick_active(std::uint64_t active, std::size_t first, Cycle cycle) {
+  Cycle* const due = due_.data() + first;
+  Clocked* const* const units = units_.data() + first;
+  for (; active != 0; active &= active - 1) {
+    const auto place = static_cast<std::size_t>(__builtin_ctzll(active));
+    tick(*units[place], cycle, due[place]);
   }
+}
+
+[[gnu::noinline]] bool ClockDomain::take_further_due(Cycle cycle) {
+  bool any = false;
+  for (std::size_t first = at_a_time; first < due_.size(); first += at_a_time) {
+    std::uint64_t& active = active_[first / at_a_time];
+    active = take_due(due_.data() + first, std::min(at_a_time, due_.size() - first), cycle);
+    any = any || active != 0;
+  }
+  return any;
 }
 
 bool ClockDomain::tick_due_in_order(Cycle cycle) {

@@ -166,6 +166,8 @@ class ClockDomain : public sc_core::sc_module {
   void edge();
   bool step_locals();
   bool tick_due(Cycle cycle);
+  void tick_active(std::uint64_t active, std::size_t first, Cycle cycle);
+  bool take_further_due(Cycle cycle);
   bool tick_due_in_order(Cycle cycle);
   void tick(Clocked& unit, Cycle cycle, Cycle& due);
   [[noreturn]] void fault_of_tick(const Clocked& unit) const;
