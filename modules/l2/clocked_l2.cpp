@@ -370,10 +370,14 @@ void ClockedL2::look_up(std::uint32_t index, std::uint32_t request, SectoredCach
 
 Cycle ClockedL2::ask_below() {
   Cycle next = never;
-  // What is written through goes first: who reads it asks for it later.
-  const std::size_t many = behaviour_->writes_through() ? 0 : std::size_t{3} * sizes_.banks * sizes_.write_backs / 4;
+  // Of what is written through who reads it asks later.
+  const bool in_order = behaviour_->writes_through();
+  const std::size_t many = std::size_t{3} * sizes_.banks * sizes_.write_backs / 4;
   while (memory_.available() && !(reads_.empty() && writes_.empty())) {
-    Ring<Below>& from = !reads_.empty() && writes_.size() < many ? reads_ : writes_.empty() ? reads_ : writes_;
+    const bool reads =
+        !reads_.empty() &&
+        (writes_.empty() || (in_order ? reads_.front().since < writes_.front().since : writes_.size() < many));
+    Ring<Below>& from = reads ? reads_ : writes_;
     if (free_tags_.empty()) {
       free_tags_.push_back(static_cast<std::uint32_t>(asked_.size()));
       asked_.emplace_back();

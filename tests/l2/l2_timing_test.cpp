@@ -203,6 +203,19 @@ TEST_P(L2AtEachFidelity, WrittenThroughGoesBelowInTheOrderOfItsBank) {
   EXPECT_GT(completed[1], completed[0]);
 }
 
+// Writes come faster than the memory below takes them, so that some always wait.
+TEST_P(L2AtEachFidelity, ReadsDoNotWaitForWhatIsWrittenThroughLater) {
+  set("write_policy", "write-through");
+  over_dram = true;
+  dram_port_requests = "1";
+  std::vector<Access> accesses;
+  for (Cycle i = 0; i < 1000; ++i) accesses.push_back(write(100 + i, 32 * i));
+  accesses.insert(accesses.begin() + 500, read(600, 1 << 20));
+  const std::vector<Cycle> completed = run(GetParam(), accesses);
+  const Cycle read_at = completed[500];
+  EXPECT_LT(std::count_if(completed.begin(), completed.end(), [&](Cycle at) { return at < read_at; }), 700);
+}
+
 TEST_P(L2AtEachFidelity, SeesHowLongFillsTakeAndHowManyAreOnTheirWay) {
   run(GetParam(), {read(100, 0, 64), read(110, line_bytes), read(500, 2 * line_bytes)});
   const Histogram& filling = model->statistics().sectors_filling;
