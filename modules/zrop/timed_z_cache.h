@@ -34,6 +34,8 @@ class TimedZCache {
         early_(time.quads_per_cycle, std::max(timing_.input_quads, QuadBeat::capacity)),
         late_(time.quads_per_cycle, std::max(timing_.input_quads, quads_per_warp)),
         updates_(time.updates_per_cycle),
+        foreseen_(time.updates_per_cycle),
+        expected_(time.updates_per_cycle),
         queued_updates_(timing_.input_updates),
         pins_lines_(TimedPins::are_needed(timing_.organization.replacement) && !timing_.fetches_ahead()),
         lines_ahead_(std::max(timing_.fetch_ahead_lines, std::uint32_t{QuadBeat::capacity})) {}
@@ -105,10 +107,15 @@ class TimedZCache {
     }
   }
 
+  /// Who sends an update is told at once when the queue takes it, long before the look-up: by when those before it are expected
+  /// to be applied.
+  Cycle room_for_update(Cycle at) { return queued_updates_.free_from(at, 1); }
+  void expect(const TerminationSignal& signal, Cycle arrived) {
+    queued_updates_.take(1, expected_.take(there(signal, arrived)) + 1);
+  }
   /// The cycle in which an update is applied that arrives in a cycle.
   Cycle update(const TerminationSignal& signal, Cycle arrived) {
-    Times times;
-    times.at = queued_updates_.free_from(arrived, 1);
+    Times times{arrived, 0, false};
     const BeatLines::Needed::Line needed = lines_->find(signal);
     const SectoredCache::Line line = look_up(needed, times);
     cache_->accessed(1, 1);
@@ -116,23 +123,10 @@ class TimedZCache {
     owe(times.at);
     const Cycle applied = updates_.take(std::max(times.at, times.there));
     keep(line, applied);
-    queued_updates_.take(1, applied);
     return applied;
   }
-
   /// The same of one that is looked up later, by what the cache holds now.
-  Cycle foreseen(const TerminationSignal& signal, Cycle arrived) {
-    const BeatLines::Needed::Line needed = lines_->find(signal);
-    const SectoredCache::Line line = cache_->find(needed.address);
-    std::uint32_t missed = needed.sectors & ~(cleared_ ? cleared_->of_line(needed.address) : 0);
-    Cycle there = arrived;
-    if (line != SectoredCache::no_line) {
-      missed &= ~cache_->present(line);
-      there = std::max(there, all_there(line, needed.sectors & cache_->present(line)));
-    }
-    if (missed != 0) there = std::max(there, arrived + fill_cycles_);
-    return foreseen_until_ = std::max(foreseen_until_, there);
-  }
+  Cycle foreseen(const TerminationSignal& signal, Cycle arrived) { return foreseen_.take(there(signal, arrived)); }
 
   /// Cycles that moving sectors takes from the z-cache and that were not asked for yet, and from when on.
   std::pair<Cycle, std::uint64_t> take_moves() {
@@ -142,6 +136,18 @@ class TimedZCache {
   }
 
  private:
+  /// When the sectors of an update are there that is looked up later, by what the cache holds now.
+  Cycle there(const TerminationSignal& signal, Cycle arrived) const {
+    const BeatLines::Needed::Line needed = lines_->find(signal);
+    const SectoredCache::Line line = cache_->find(needed.address);
+    std::uint32_t missed = needed.sectors & ~(cleared_ ? cleared_->of_line(needed.address) : 0);
+    Cycle there = arrived;
+    if (line != SectoredCache::no_line) {
+      missed &= ~cache_->present(line);
+      there = std::max(there, all_there(line, needed.sectors & cache_->present(line)));
+    }
+    return missed == 0 ? there : std::max(there, arrived + fill_cycles_);
+  }
   /// From the look-up of quads to their test, in order.
   struct Way {
     Way(unsigned quads_per_cycle, unsigned places) : look_ups(quads_per_cycle), queue(places) {}
@@ -252,6 +258,7 @@ class TimedZCache {
   Way early_;
   Way late_;
   IssuePort updates_;
+  IssuePort foreseen_, expected_;  ///< the same of updates that are looked up later
   SlotPool queued_updates_;
   std::optional<BeatLines> lines_;
   std::optional<SectoredCache> cache_;
@@ -262,7 +269,6 @@ class TimedZCache {
   TimedPins pins_;
   std::vector<Cycle> there_;  ///< by sector
   Cycle fill_cycles_ = 0;     ///< of the last fill
-  Cycle foreseen_until_ = 0;  ///< of updates
   // Where tags are looked at twice:
   std::vector<TimedLineUses> uses_;  ///< by line of the surface
   SlotPool lines_ahead_;             ///< between two looks

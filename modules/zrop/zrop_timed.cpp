@@ -101,12 +101,9 @@ class TimedZrop : public TimedUnit {
   Cycle update(const TerminationBeat& beat, Cycle visible) {
     Cycle at = visible;
     for (unsigned i = 0; i < beat.count; ++i) {
-      at = updates_.take(visible);
-      if (has_cache_) {
-        arrived_.push({beat.signals[i], at});
-        continue;
-      }
-      pending_.push({beat.signals[i], at});
+      at = updates_.take(has_cache_ ? z_.room_for_update(visible) : visible);
+      if (has_cache_) z_.expect(beat.signals[i], at);
+      (has_cache_ ? arrived_ : pending_).push({beat.signals[i], at});
     }
     return at;
   }
@@ -322,17 +319,21 @@ class TimedZrop : public TimedUnit {
     if (!late_.empty()) make_way(visible);
     if (has_cache_) move_sectors(visible);
     Cycle at = tests_.take(visible, quads);
-    in_terminations_.ask(at);
-    if (has_cache_) foresee_updates(at);
+    know_updates(at);
     while (!pending_.empty() && pending_.front().at <= at) {
       // One z-cache port: a cycle with updates tests nothing.
       if (pending_.front().at == at) {
         at = tests_.take(at + 1, quads);
-        in_terminations_.ask(at);
+        know_updates(at);
       }
       apply_update();
     }
     return at;
+  }
+  /// Those that are applied up to a test.
+  void know_updates(Cycle test) {
+    in_terminations_.ask(test);
+    if (has_cache_) foresee_updates(test);
   }
 
   /// When a part of a bin can be tested; extends the cycles of its bin's look-ups.

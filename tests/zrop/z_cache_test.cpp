@@ -587,5 +587,51 @@ TEST_F(TimedZCacheTest, ATestSeesAnUpdateThatCameBehindItsLookUp) {
   }
 }
 
+TEST_F(TimedZCacheTest, ATestThatHasComeWaitsForAllUpdatesThatFollowOneAnother) {
+  for (const unsigned updates : {1U, 5U}) {
+    Bench bench(Fidelity::lt, "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"fast_clear", "off"}});
+    NotingMemory memory("noting_memory", bench.clock(), 100);
+    bench.bind_memory(memory.socket);
+    Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
+    Source<TerminationBeat>& terminations = bench.source<TerminationBeat>("in_terminations", 8, 110);
+    Sink<BinItem>& out = bench.sink<BinItem>("out_quads", 64);
+    // Of the sector that the test waits for, one a cycle from 121 on.
+    for (unsigned i = 0; i < updates; ++i) terminations.add(signals({1}), 11 + i);
+    in.add(bins.at({0, 0}, {0}), 20);  // looked up in 21, there in 121
+    bench.run();
+    EXPECT_EQ(testing::cycles_of(out), (std::vector<Cycle>{122 + updates}));
+  }
+}
+
+TEST_F(TimedZCacheTest, UpdatesThatWaitForTheirFillsTakeOneCycleEach) {
+  Bench bench(Fidelity::lt, "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"fast_clear", "off"}});
+  NotingMemory memory("noting_memory", bench.clock(), 100);
+  bench.bind_memory(memory.socket);
+  Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
+  Source<TerminationBeat>& terminations = bench.source<TerminationBeat>("in_terminations", 4, 90);
+  Sink<BinItem>& out = bench.sink<BinItem>("out_quads", 64);
+  terminations.add(signals({0, 1, 0, 1}), 11);  // looked up from 101 on, by the fill of the test there in 121
+  in.add(bins.at({0, 0}, {0}), 20);
+  bench.run();
+  EXPECT_EQ(testing::cycles_of(out), (std::vector<Cycle>{126}));
+}
+
+TEST_F(TimedZCacheTest, AFullQueueOfUpdatesHoldsTheLink) {
+  for (const unsigned places : {1U, 2U}) {
+    Bench bench(Fidelity::lt, "zrop", "depth-stencil-rop", context,
+                {{"latency_cycles", "1"}, {"fast_clear", "off"}, {"input_updates", std::to_string(places)}});
+    NotingMemory memory("noting_memory", bench.clock(), 100);
+    bench.bind_memory(memory.socket);
+    Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
+    Source<TerminationBeat>& updates = bench.source<TerminationBeat>("in_terminations", 1);
+    bench.sink<BinItem>("out_quads", 64);
+    in.add(bins.at({0, 0}, {16}), 10);  // by which it is known how long a fill takes
+    for (const unsigned position : {0U, 4U, 32U}) updates.add(signals({position}), 200);
+    bench.run();
+    // The first is in the queue from 201 to 301.
+    EXPECT_EQ(updates.sent().at(2), places == 2 ? 204U : 303U) << places;
+  }
+}
+
 }  // namespace
 }  // namespace vrpipe
