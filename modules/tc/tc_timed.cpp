@@ -19,7 +19,10 @@ class TimedTc : public TimedUnit {
       : TimedUnit(name, domain, behaviour->time().kinds()),
         out_(*this, "out_bins"),
         in_(*this, "in_quads",
-            [this](const QuadBeat& beat, CycleInterval visible) { return collect(beat, visible.last); }),
+            [this](const QuadBeat& beat, CycleInterval visible) -> CycleInterval {
+              const Cycle at = collect(beat, visible.last);
+              return {at - (visible.last - visible.first), at};  // each part as it came
+            }),
         behaviour_(std::move(behaviour)),
         passing_(context),
         time_(behaviour_->time()),

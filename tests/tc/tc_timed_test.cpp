@@ -60,6 +60,14 @@ TEST_F(TcTimedTest, AFullBinIsSeenFromTheCycleAfterItFilledPlusTheLatencyOnABeat
   EXPECT_EQ(splats_of(tc.out.records()[0].item), numbers(64));
 }
 
+// A rasteriser of a quad a cycle.
+TEST_F(TcTimedTest, QuadsOfATileThatComeOneByOneMakeRoomForTheNextOneByOne) {
+  TimedTcBench tc(Fidelity::lt, context, {}, 16);
+  for (unsigned i = 0; i < 3; ++i) tc.in.add(beat_of(tile(0), numbers(16), 16 * i), {1, 16}, 16);
+  tc.bench.run();
+  EXPECT_EQ(tc.in.sent(), (std::vector<Cycle>{1, 17, 33}));
+}
+
 TEST_F(TcTimedTest, TakesItsQuadsPerCycleAndHandsBinsOnAtTheSameRate) {
   for (const unsigned rate : {4U, 8U, 16U}) {
     TimedTcBench tc(Fidelity::lt, context,
