@@ -61,10 +61,14 @@ class TimedZCache {
   void clear() {
     if (cleared_) cleared_->clear();
   }
-  /// When so many quads that become visible in a cycle are looked up.
-  Cycle turn(unsigned quads, Cycle visible) {
-    if (timing_.fetches_ahead()) return early_.look_ups.take(lines_ahead_.free_from(visible, 1), quads);
-    return early_.turn(quads, visible);
+  /// When so many quads that become visible in a cycle are looked up. Where tags run ahead a beat takes its time with the first
+  /// part of it, and the others go beside that; `begun`: its quads, or 0.
+  Cycle turn(unsigned quads, unsigned begun, Cycle visible) {
+    if (!timing_.fetches_ahead()) return early_.turn(quads, visible);
+    const Cycle at = lines_ahead_.free_from(visible, 1);
+    if (begun > 0) return early_.take(begun, at);
+    early_.look_ups.hold(at);
+    return early_.look_ups.now();
   }
   /// In its turn; `tested` follows.
   Times look_up(const QuadBeat& beat, Cycle turn, bool needs_stencil) {
@@ -151,8 +155,13 @@ class TimedZCache {
   /// From the look-up of quads to their test, in order.
   struct Way {
     Way(unsigned quads_per_cycle, unsigned places) : look_ups(quads_per_cycle), queue(places) {}
-    Cycle turn(unsigned quads, Cycle visible) { return look_ups.take(queue.free_from(visible, quads), quads); }
-    IssuePort look_ups;
+    Cycle take(unsigned quads, Cycle at) {
+      at = look_ups.free_from(quads, at);
+      look_ups.take(quads);
+      return at;
+    }
+    Cycle turn(unsigned quads, Cycle visible) { return take(quads, queue.free_from(visible, quads)); }
+    BatchLimit look_ups;
     SlotPool queue;  ///< quads between look-up and test
     Cycle read = 0;  ///< the last line looked up for a test
   };

@@ -140,7 +140,8 @@ class TimedZrop : public TimedUnit {
     tests_.hold(out_.last());
     charge(UnitState::blocked, out_.last());
     if (item.mark != Mark::none) {
-      const Cycle at = tests_.take(visible.first);
+      const Cycle at = tests_.free_from(1, visible.first);
+      tests_.take(1);
       if (plan_.waits_at(item.mark)) return send_around(item, at);
       if (has_cache_) look_up_updates(at);
       pass(item.mark, at);
@@ -163,8 +164,9 @@ class TimedZrop : public TimedUnit {
     const bool needs_stencil = has_cache_ && state != nullptr && state->reads_depth_stencil_early();
     const bool may_change = needs_stencil && state->tests_early() && state->writes_depth_stencil();
     const bool hi_z = total > 0 && hi_z_.wanted(quads.front().draw);
-    // Spread over the bin: a block whose quads are in two parts is paid for with both.
-    const std::uint64_t price = blocks_.is_on() ? blocks_.of(item.tile, quads.data(), total) : 0;
+    // Parts as at cycle pay for themselves. Else it is spread over the bin: a block whose quads are in two parts is paid for with both.
+    const bool parts_pay = has_cache_ && time_.z_cache.fetches_ahead();
+    const std::uint64_t price = blocks_.is_on() && !parts_pay ? blocks_.of(item.tile, quads.data(), total) : 0;
     QuadBeat beat;
     beat.tile = item.tile;
     item.quads = item.beats = 0;
@@ -174,13 +176,19 @@ class TimedZrop : public TimedUnit {
       beat.last_of_bin = item.last_part && part + 1 == parts;
       std::copy_n(quads.begin() + from, beat.count, beat.quads.begin());
       Cycle ready = visible.of_part(part, parts);
-      if (has_cache_) ready = look_up(beat, ready, needs_stencil, looked_up);
+      if (has_cache_) {
+        const bool begins = from % of_beat == 0;
+        ready = look_up(beat, ready, begins ? std::min(of_beat, total - from) : 0, needs_stencil, looked_up);
+      }
       const Cycle at = take(ready, beat.count);
       if (has_cache_) z_.tested(beat.count, needs_stencil, at);
       const unsigned tested_quads = beat.count;
       port_free_at_ = time_.end_of_tests(at, tested_quads);
-      if (blocks_.is_on())
-        pay_for_blocks(price * (from + tested_quads) / total - price * from / total, tested_quads, at);
+      if (blocks_.is_on()) {
+        pay_for_blocks(parts_pay ? blocks_.of(item.tile, beat.quads.data(), tested_quads)
+                                 : price * (from + tested_quads) / total - price * from / total,
+                       tested_quads, at);
+      }
       did(ZropWork::tests, tested_quads, at, port_free_at_);
       QuadBeat before;
       if (may_change || hi_z || tells_draws()) before = beat;
@@ -226,7 +234,7 @@ class TimedZrop : public TimedUnit {
   /// Quads of a bin that are looked up and tested together: of one primitive and one beat where tags are looked at twice.
   unsigned end_of_part(const std::vector<Quad>& quads, unsigned from, unsigned total, unsigned of_beat) const {
     if (!has_cache_ || !time_.z_cache.fetches_ahead()) return std::min(total, from + at_once_);
-    const unsigned most = std::min({total, from + at_once_, (from / of_beat + 1) * of_beat});
+    const unsigned most = std::min(total, (from / of_beat + 1) * of_beat);
     unsigned end = from + 1;
     while (end < most && primitive_order(quads[end]) == primitive_order(quads[from])) ++end;
     return end;
@@ -301,7 +309,8 @@ class TimedZrop : public TimedUnit {
   [[gnu::noinline]] void make_way(Cycle test) {
     for (; !late_.empty() && late_.front().at <= std::max(test, tests_.next_free()); late_.pop()) {
       const unsigned quads = late_.front().quads;
-      const Cycle at = tests_.take(late_.front().at, quads);
+      const Cycle at = tests_.free_from(quads, late_.front().at);
+      tests_.take(quads);
       const Cycle until = time_.end_of_tests(at, quads);
       did(ZropWork::late_tests, quads, at, until);
       if (blocks_.is_on()) block_time_.test(at, quads, 0);
@@ -318,16 +327,17 @@ class TimedZrop : public TimedUnit {
   Cycle take(Cycle visible, unsigned quads) {
     if (!late_.empty()) make_way(visible);
     if (has_cache_) move_sectors(visible);
-    Cycle at = tests_.take(visible, quads);
+    Cycle at = tests_.free_from(quads, visible);
     know_updates(at);
     while (!pending_.empty() && pending_.front().at <= at) {
       // One z-cache port: a cycle with updates tests nothing.
       if (pending_.front().at == at) {
-        at = tests_.take(at + 1, quads);
+        at = tests_.free_from(quads, at + 1);
         know_updates(at);
       }
       apply_update();
     }
+    tests_.take(quads);
     return at;
   }
   /// Those that are applied up to a test.
@@ -336,9 +346,9 @@ class TimedZrop : public TimedUnit {
     if (has_cache_) foresee_updates(test);
   }
 
-  /// When a part of a bin can be tested; extends the cycles of its bin's look-ups.
-  Cycle look_up(const QuadBeat& beat, Cycle visible, bool needs_stencil, CycleInterval& looked_up) {
-    const Cycle turn = z_.turn(beat.count, visible);
+  /// When a part of a bin can be tested; extends the cycles of its bin's look-ups. `begun`: quads of the beat that it begins, or 0.
+  Cycle look_up(const QuadBeat& beat, Cycle visible, unsigned begun, bool needs_stencil, CycleInterval& looked_up) {
+    const Cycle turn = z_.turn(beat.count, begun, visible);
     in_terminations_.ask(turn);
     look_up_updates(turn);
     const TimedZCache::Times times = z_.look_up(beat, turn, needs_stencil);
@@ -381,7 +391,7 @@ class TimedZrop : public TimedUnit {
   std::unique_ptr<ZropBehaviour> behaviour_;
   const ZropTime time_;
   const unsigned at_once_;
-  IssuePort tests_;
+  BatchLimit tests_;
   IssuePort late_tests_;
   Ring<LateTest> late_;  ///< that tests have not made way to yet
   IssuePort updates_;

@@ -116,5 +116,30 @@ TEST(BatchLimit, NextIsTheFirstCycleThatAllowsABatch) {
   }
 }
 
+TEST(BatchLimit, SaysWhenABatchMayGoAsItLetsItThroughCycleByCycle) {
+  BatchLimit asked(8);
+  BatchLimit tried(8);
+  Cycle now = 0;
+  for (std::uint64_t i = 0; i < 1000; ++i) {
+    const auto items = static_cast<std::uint32_t>(1 + mix(i) % 20);
+    const Cycle earliest = now + mix(i + 7000) % 3;
+    for (now = earliest; !tried.allows(items, now);) ++now;
+    tried.take(items);
+    ASSERT_EQ(asked.free_from(items, earliest), now) << i;
+    asked.take(items);
+  }
+}
+
+TEST(BatchLimit, AWholeCycleIsOneInWhichNothingBegins) {
+  BatchLimit limit(8);
+  limit.take(20);  // of cycles 0 and 1, and half of 2
+  EXPECT_EQ(limit.next_free(), 2U);
+  EXPECT_EQ(limit.take_cycle(1), 2U);
+  EXPECT_EQ(limit.take_cycle(2), 3U);
+  EXPECT_EQ(limit.free_from(8, 0), 4U);
+  limit.hold(9);
+  EXPECT_EQ(limit.free_from(1, 5), 9U);
+}
+
 }  // namespace
 }  // namespace vrpipe

@@ -633,5 +633,75 @@ TEST_F(TimedZCacheTest, AFullQueueOfUpdatesHoldsTheLink) {
   }
 }
 
+/// A bin of primitives that each cover some of one or two raster tiles.
+std::vector<Quad> random_bin(std::uint32_t number) {
+  const auto below = [&](unsigned salt, std::uint64_t count) {
+    return static_cast<unsigned>(mix(number * 1000U + salt) % count);
+  };
+  std::vector<Quad> quads;
+  const unsigned primitives = 2 + below(0, 10);
+  for (unsigned primitive = 0; primitive < primitives; ++primitive) {
+    const unsigned tiles = 1 + below(10 * primitive + 1, 2);
+    for (unsigned tile = 0; tile < tiles; ++tile) {
+      const unsigned part = below(10 * primitive + 2 + tile, 4);
+      const unsigned count = 3 + below(10 * primitive + 5 + tile, 13);
+      for (unsigned i = 0; i < count; ++i) {
+        const unsigned position = (i / 4 + 4 * (part / 2)) * quads_per_tile_row + i % 4 + 4 * (part % 2);
+        quads.push_back({100 * number + primitive, static_cast<std::uint8_t>(position), all_lanes, 0, 0});
+      }
+    }
+  }
+  return quads;
+}
+
+// What is looked up and tested together is a primitive's in a beat, also where that is wider than the unit.
+TEST_F(TimedZCacheTest, WhereTagsRunAheadBinsAreTestedAboutInTheCyclesOfCycle) {
+  const Draw wide = testing::draw_of(512, 512);
+  RenderContext of_wide = testing::context_of(wide);
+  testing::terminate_early(of_wide);
+  for (const unsigned rate : {8U, 16U}) {
+    const Bench::Settings settings{
+        {"latency_cycles", "1"},      {"fast_clear", "off"},   {"quads_per_cycle", std::to_string(rate)},
+        {"line_bytes", "512"},        {"mshrs", "2048"},       {"sectors_per_cycle", "64"},
+        {"fetch_ahead_lines", "256"}, {"cache_bytes", "16384"}};
+    const auto last_at = [&](Fidelity fidelity) {
+      Bench bench(fidelity, "zrop", "depth-stencil-rop", of_wide, settings);
+      NotingMemory memory("noting_memory", bench.clock(), 100);
+      bench.bind_memory(memory.socket);
+      bench.source<TerminationBeat>("in_terminations");
+      Source<BinItem>* const bins_in = fidelity == Fidelity::lt ? &bench.source<BinItem>("in_quads", 64) : nullptr;
+      Source<QuadBeat>* const beats_in = fidelity == Fidelity::lt ? nullptr : &bench.source<QuadBeat>("in_quads", 64);
+      if (beats_in != nullptr) beats_in->set_rate(1);
+      if (bins_in != nullptr) bins_in->set_rate(1);
+      for (std::uint32_t number = 0; number < 60; ++number) {
+        const std::vector<Quad> quads = random_bin(number);
+        const auto count = static_cast<unsigned>(quads.size());
+        const unsigned beats = (count + QuadBeat::capacity - 1) / QuadBeat::capacity;
+        const TileId tile{static_cast<std::uint16_t>(mix(number) % 32),
+                          static_cast<std::uint16_t>(mix(number) / 32 % 8)};
+        if (bins_in != nullptr) bins_in->add(bins.of(tile, quads), {0, beats - 1}, beats);
+        for (unsigned from = 0; beats_in != nullptr && from < count; from += QuadBeat::capacity) {
+          QuadBeat beat;
+          beat.tile = tile;
+          beat.last_of_bin = from + QuadBeat::capacity >= count;
+          for (unsigned i = from; i < std::min(from + QuadBeat::capacity, count); ++i)
+            beat.quads[beat.count++] = quads[i];
+          beats_in->add(beat);
+        }
+      }
+      if (bins_in != nullptr) {
+        const Sink<BinItem>& out = bench.sink<BinItem>("out_quads", 256);
+        bench.run();
+        return out.records().back().last;
+      }
+      const Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 256);
+      bench.run();
+      return out.records().back().cycle;
+    };
+    const auto at_cycle = static_cast<double>(last_at(Fidelity::cycle));
+    EXPECT_NEAR(static_cast<double>(last_at(Fidelity::lt)), at_cycle, 0.015 * at_cycle) << rate;
+  }
+}
+
 }  // namespace
 }  // namespace vrpipe

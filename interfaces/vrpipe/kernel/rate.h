@@ -73,6 +73,27 @@ class BatchLimit {
     left_ -= items;
     first_ = false;
   }
+  /// The same at `lt`: the first cycle from one on, and from those that are known, in which it may go.
+  Cycle free_from(std::uint32_t items, Cycle at) {
+    for (at = std::max(at, cycle_); !allows(items, at);) at = next(at);
+    return at;
+  }
+  /// Nothing goes before this cycle any more.
+  void hold(Cycle cycle) {
+    if (cycle > cycle_) allows(1, cycle);
+  }
+  /// The last cycle that was asked for.
+  Cycle now() const { return cycle_; }
+  /// Takes a whole cycle from one on, in which nothing begins; returns it.
+  Cycle take_cycle(Cycle earliest) {
+    const Cycle at = std::max(earliest, next_free());
+    hold(at);
+    left_ = std::min<std::int64_t>(left_, 0);
+    first_ = false;
+    return at;
+  }
+  /// The first cycle in which nothing has begun, and something may.
+  Cycle next_free() const { return first_ && left_ > 0 ? cycle_ : next(cycle_); }
   /// The first cycle after `now` in which a batch may go.
   Cycle next(Cycle now) const { return left_ > 0 ? now + 1 : now + 1 + static_cast<Cycle>(-left_ / rate_); }
 
