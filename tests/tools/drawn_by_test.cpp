@@ -197,6 +197,10 @@ TEST_F(DrawnBy, WhatTheyAreWithoutIsRefused) {
   bad({"run", "--variant", "software", "--unit", "accelerator=gcc"},
       {"accelerator=gcc", "no variant here draws with it"});
   bad({"run", "--variant", "software", "--set", "preparation.record_cycles=8"}, {"preparation", "no variant here"});
+  for (const char* unit : {"crop=in-shader", "gpc0.crop=in-shader"}) {
+    for (const char* variant : {"software", "accelerator"})
+      bad({"run", "--variant", variant, "--unit", unit}, {unit, "no variant here draws with it"});
+  }
   bad({"compare", "--variant", "baseline", "--variant", "m=software,accelerator=gcc"}, {"variant m", "accelerator"});
   bad({"compare", "--variant", "m=het,render=endless"}, {"'render'", "has none"});
   bad({"run", "--variant", "software", "--trace", "t.json"}, {"--trace", "variant software"});

@@ -96,6 +96,9 @@ TEST_F(Variants, KeepAUnitOfTheirOwn) {
           {"--unit crop=color-rop", "a unit of its own in slot crop"});
   refused({"run", "--scene", "tiny.spl", "--variant", "own=het,tgc=pass-through", "--unit", "tgc=tile-grid-coalescing"},
           {"variant own has a unit of its own in slot tgc"});
+  refused({"compare", "--scene", "tiny.spl", "--variant", "in-shader", "--variant", "software", "--unit",
+           "crop=color-rop"},
+          {"--unit crop=color-rop", "variant in-shader has a unit of its own in slot crop"});
   const std::vector<std::string> both{"compare",   "--scene",   "tiny.spl", "--variant",     "baseline",
                                       "--variant", "in-shader", "--unit",   "crop=color-rop"};
   const json result = json_of(both);

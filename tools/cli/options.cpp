@@ -90,32 +90,40 @@ void check_unit(const std::string& text) {
 /// Whether it draws with kernels, or by an accelerator.
 bool is_outside(const Variant& variant) { return !variant.is_of_pipeline(); }
 
-/// What is for kernels and accelerators, where no variant draws with these.
+/// A unit of a slot with which no variant draws; a setting only if it is for kernels and accelerators: a configuration file
+/// may set everything.
 void refuse_unused(const RunRequest& request, const std::vector<Variant>& variants) {
   const bool draws_outside = std::any_of(variants.begin(), variants.end(), is_outside);
   const auto check = [&](const std::string& option, const std::string& slot) {
     const auto uses = [&](const Variant& variant) { return draws_with(variant, slot); };
-    if (!is_outside_pipeline(slot) || std::any_of(variants.begin(), variants.end(), uses)) return;
+    if (std::any_of(variants.begin(), variants.end(), uses)) return;
     throw UserError("cannot choose or set '" + slot + "'", option,
                     draws_outside ? "no variant here draws with it" : "it is no unit of a draw by hardware",
                     "leave it out, or take a variant that draws with it, or `vrpipe frames`");
   };
-  for (const Setting& setting : request.settings)
-    check("--set " + setting.unit + "." + setting.parameter, setting.unit);
+  for (const Setting& setting : request.settings) {
+    if (is_outside_pipeline(setting.unit)) check("--set " + setting.unit + "." + setting.parameter, setting.unit);
+  }
   for (const UnitChoice& choice : request.units)
-    check("--unit " + choice.slot + "=" + choice.implementation, choice.slot);
+    check("--unit " + choice.slot + "=" + choice.implementation, without_gpc(choice.slot));
 }
 
-/// A unit for all that no variant takes.
+/// A unit for all that no variant takes, after refuse_unused().
 void refuse_overridden(const std::vector<UnitChoice>& units, const std::vector<Variant>& variants) {
   for (const UnitChoice& choice : units) {
-    const UnitChoice* own = nullptr;
-    const auto has_own = [&](const Variant& variant) { return (own = own_unit(variant, choice)) != nullptr; };
-    if (!std::all_of(variants.begin(), variants.end(), has_own)) continue;
+    const Variant* other = nullptr;
+    const auto takes = [&](const Variant& variant) {
+      if (!draws_with(variant, without_gpc(choice.slot))) return false;
+      if (own_unit(variant, choice) == nullptr) return true;
+      other = &variant;
+      return false;
+    };
+    if (std::any_of(variants.begin(), variants.end(), takes)) continue;
+    const UnitChoice& own = *own_unit(*other, choice);
     throw UserError("cannot choose a unit for '" + choice.slot + "'",
                     "--unit " + choice.slot + "=" + choice.implementation,
-                    fmt::format("variant {} has a unit of its own in slot {}, {}", variants.back().name, own->slot,
-                                own->implementation),
+                    fmt::format("variant {} has a unit of its own in slot {}, {}", other->name, own.slot,
+                                own.implementation),
                     "leave it out, or take another variant");
   }
 }
