@@ -105,6 +105,12 @@ TEST_F(Variants, KeepAUnitOfTheirOwn) {
   EXPECT_EQ(result["runs"][0]["implementations"]["crop"], "color-rop");
   EXPECT_EQ(result["runs"][1]["implementations"]["crop"], "in-shader");
   EXPECT_NE(vrpipe(both).out.find("crop=color-rop (not in in-shader, with its own)"), std::string::npos);
+  std::vector<std::string> on_a_page = both;
+  on_a_page.insert(on_a_page.end(), {"--variant", "software", "--fidelity", "functional", "--html", "page.html"});
+  EXPECT_EQ(vrpipe(on_a_page).code, 0);
+  EXPECT_NE(read_file(folder() / "page.html")
+                .find("crop = color-rop (not in in-shader, with its own; not in software, without crop)"),
+            std::string::npos);
 }
 
 TEST_F(Variants, HaveImagesOfTheirOwn) {
