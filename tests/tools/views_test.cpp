@@ -410,6 +410,24 @@ TEST_F(Views, NeverOverwriteWhatTheyReadOrWriteElse) {
 
 // Journals.
 
+TEST_F(Views, RemoveJournalsThatWereLeftAloneForAMonth) {
+  const auto left_alone = [&](const std::string& name, int days) {
+    const std::filesystem::path path = cache() / "vrpipe" / name;
+    std::ofstream(path) << "{}\n";
+    std::filesystem::last_write_time(path,
+                                     std::filesystem::file_time_type::clock::now() - std::chrono::hours(24 * days));
+    return path;
+  };
+  std::filesystem::create_directories(cache() / "vrpipe");
+  const auto old = left_alone("sweep-0123456789abcdef.jsonl", 31);
+  const auto recent = left_alone("views-0123456789abcdef.jsonl", 29), users = left_alone("mine.jsonl", 31);
+  const Finished finished = vrpipe(of_file({"--views", "2"}));
+  EXPECT_EQ(finished.code, 0) << finished.err;
+  EXPECT_FALSE(std::filesystem::exists(old));
+  EXPECT_TRUE(std::filesystem::exists(recent));
+  EXPECT_TRUE(std::filesystem::exists(users)) << "--journal may name a file there";
+}
+
 TEST_F(Views, ARunThatWasKilledGoesOnAndEndsWithTheSameBytes) {
   const std::vector<std::string> words =
       command({"--views", "60", "--size", "64x48", "--platform", "agx-orin-ideal-memory", "--json", "result.json"});

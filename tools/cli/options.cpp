@@ -475,7 +475,8 @@ void SimulationArguments::declare_views(Arguments& arguments) {
   arguments.find(ViewsChoice::option)->check = view_count;
   arguments.add_option(ViewsChoice::journal_option, journal_, "FILE",
                        "where --views stores what is done, and goes on from; it stays (default: a\n"
-                       "file in the user's cache folder, removed at the end)",
+                       "file in the user's cache folder, removed at the end, or by a later study when\n"
+                       "it was left alone for 30 days)",
                        result_group);
 }
 
