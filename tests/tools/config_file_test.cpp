@@ -282,6 +282,10 @@ TEST_F(ConfigFile, ThatSaysWhatIsSoAnywayChangesNothingInTheReport) {
 TEST_F(ConfigFile, ThatCannotBeUsedIsRefusedWithItsLine) {
   bad("sise = \"32x32\"\n", {"unknown key 'sise'", "config.toml:1", "did you mean size"});
   bad("scene = \"tiny.spl\"\n\nsize = \"32\"\n", {"config.toml:3", "--size", "WIDTHxHEIGHT"});
+  bad("fidelity = \"lt\"\nscene = \"nowhere.ply\"\n", {"cannot read scene (config.toml:2, nowhere.ply)"});
+  bad("fidelity = \"lt\"\nscene = \"train=nowhere.ply\"\n", {"cannot read scene (config.toml:2, nowhere.ply)"});
+  bad("scene = \"builtin:nowhere\"\n", {"config.toml:1, builtin:nowhere"});
+  bad("\nmesh = [\n  \"nowhere.obj\"]\n", {"cannot read mesh (config.toml:3, nowhere.obj)"});
   bad("[set]\n\ntc.bin = 4\n", {"'bin'", "config.toml:3", "tc.bins"});
   bad("[set]\ntc.bins = 0\n", {"config.toml:2", "tc.bins"});
   bad("[set]\n\ntc = 3\n", {"'tc'", "config.toml:3", "no UNIT.PARAMETER"});
