@@ -237,6 +237,30 @@ TEST_F(ConfigFile, PrintedReadsBackToTheSameRunAndTheSameFile) {
   }
 }
 
+// Defaults of a scene may be others in a later version.
+TEST_F(ConfigFile, PrintedHasTheCameraOfTheScene) {
+  std::filesystem::copy_file(VRPIPE_FORMATS "/sh0.ply", folder() / "small.ply");
+  for (const std::vector<std::string>& scene :
+       std::vector<std::vector<std::string>>{{"--scene", "builtin:object", "--size", "48x32", "--set",
+                                              "preprocess.sh_degree=0"},
+                                             {"--scene", "small.ply", "--fovy", "30"},
+                                             {"--scene", "train=small.ply", "--size", "48x32"},
+                                             {"--scene", "small.ply", "--size", "48x32", "--orthographic", "3"}}) {
+    std::vector<std::string> command{"run", "--fidelity", "lt"};
+    command.insert(command.end(), scene.begin(), scene.end());
+    const std::string text = printed(command);
+    SCOPED_TRACE(text);
+    for (const char* option : {"size", "eye", "look-at", "up"})
+      EXPECT_NE(text.find(std::string("\n") + option + " = "), std::string::npos) << option;
+    write("printed.toml", text);
+    const json first = json_of(command), again = json_of({"run", "--config", "printed.toml"});
+    EXPECT_EQ(comparable(first), comparable(again));
+    EXPECT_FALSE(first["camera"].is_null());
+  }
+  EXPECT_NE(printed({"run", "--scene", "builtin:train"}).find("\nsize = \"980x545\" "), std::string::npos);
+  EXPECT_EQ(printed({"run", "--scene", "tiny.spl"}).find("\nsize = "), std::string::npos) << "it has no other";
+}
+
 TEST_F(ConfigFile, PrintedHasEveryParameterAndItsOrigin) {
   write("config.toml", "scene = \"tiny.spl\"\nplatform = \"mobile\"\n[set]\ntc.bin_quads = 16\n");
   const std::string text = printed({"run", "--config", "config.toml", "--set", "tgc.bins=7"});
