@@ -170,16 +170,24 @@ void refuse_mesh(const std::string& path) {
   throw UserError("cannot read scene", path, "it is a triangle mesh, no Gaussians", "draw it with a scene, as a mesh");
 }
 
+Viewpoint viewpoint_in(const BuiltinSceneInfo& builtin, const SceneRequest& request) {
+  return viewpoint(request, builtin.size, [&] { return with_options(builtin.view, request); });
+}
+
+Viewpoint viewpoint_in(const GaussianFile& file, const SceneRequest& request) {
+  return viewpoint(request, kDefaultImageSize, [&] { return automatic_view(request.scene, file, request); });
+}
+
 void open_builtin(const std::string& name, const SceneRequest& request, OpenedScene& scene) {
   const BuiltinScene builtin = request.scene_cache ? cached_builtin_scene(name) : make_builtin_scene(name);
   scene.gaussians = builtin.gaussians;
   scene.meshes = builtin.meshes;
-  scene.viewpoint = viewpoint(request, builtin.info.size, [&] { return with_options(builtin.info.view, request); });
+  scene.viewpoint = viewpoint_in(builtin.info, request);
 }
 
 void open_file(const SceneRequest& request, OpenedScene& scene) {
   GaussianFile file = open_gaussians(request.scene);
-  scene.viewpoint = viewpoint(request, kDefaultImageSize, [&] { return automatic_view(request.scene, file, request); });
+  scene.viewpoint = viewpoint_in(file, request);
   scene.gaussians = std::move(file.gaussians);
   scene.notes = std::move(file.notes);
 }
@@ -188,6 +196,13 @@ void read_meshes(const SceneRequest& request, OpenedScene& scene) {
   for (const std::string& file : request.meshes) {
     scene.meshes.push_back(std::make_shared<const Mesh>(read_mesh(file, scene.rejected_triangles)));
   }
+}
+
+/// The size of the built-in scene remains; the view does not fit another model.
+SceneRequest of_file(SceneRequest request, const SceneSubstitution& in_place) {
+  request.scene = in_place.file;
+  if (!request.size && !is_draw_list(in_place.file)) request.size = builtin_scene_named(in_place.name).size;
+  return request;
 }
 
 bool is_builtin(const std::string& scene) { return scene.rfind(kBuiltinPrefix, 0) == 0 && !scene_substitution(scene); }
@@ -238,13 +253,18 @@ View view_of(const std::string& scene, const GaussianFile& gaussians) {
   return info->view;
 }
 
+std::optional<Viewpoint> viewpoint_of(const SceneRequest& request) {
+  if (const auto in_place = scene_substitution(request.scene)) return viewpoint_of(of_file(request, *in_place));
+  if (is_draw_list(request.scene)) return std::nullopt;
+  check_view_options(request);
+  const std::string name = scene_name(request.scene);
+  if (is_builtin(name)) return viewpoint_in(builtin_scene_named(name.substr(kBuiltinPrefix.size())), request);
+  return viewpoint_in(open_gaussians(request.scene), request);
+}
+
 OpenedScene open_scene(const SceneRequest& request) {
   if (const auto in_place = scene_substitution(request.scene)) {
-    // The size remains; the view does not fit another model.
-    SceneRequest of_file = request;
-    of_file.scene = in_place->file;
-    if (!request.size && !is_draw_list(in_place->file)) of_file.size = builtin_scene_named(in_place->name).size;
-    OpenedScene scene = open_scene(of_file);
+    OpenedScene scene = open_scene(of_file(request, *in_place));
     scene.name = scene_name(request.scene);
     return scene;
   }

@@ -119,6 +119,13 @@ TEST_F(ConfigFile, IsCheckedWhereTheCommandLineSaysOtherwise) {
                                                {"platform = \"bogus\"", "--platform", "mobile"},
                                                {"size = 3", "--size", "32x32"},
                                                {"fovy = nan", "--fovy", "40"},
+                                               {"fovy = 500", "--fovy", "40"},
+                                               {"orthographic = 0", "--orthographic", "3"},
+                                               {"error = 0", "--error", "2%"},
+                                               {"seed = 0", "--seed", "3"},
+                                               {"variants.a = { base = \"het\", set.tc.bins = 0 }", "--variant",
+                                                "a=het"},
+                                               {"variant = \"a=het,qru=bogus\"", "--variant", "het"},
                                                {"eye = [0, 1]", "--eye", "0,0,-4"},
                                                {"variant = \"hat\"", "--variant", "het"},
                                                {"format = \"rgb\"", "--format", "rgba8"},
@@ -230,6 +237,30 @@ TEST_F(ConfigFile, PrintedReadsBackToTheSameRunAndTheSameFile) {
   }
 }
 
+// Defaults of a scene may be others in a later version.
+TEST_F(ConfigFile, PrintedHasTheCameraOfTheScene) {
+  std::filesystem::copy_file(VRPIPE_FORMATS "/sh0.ply", folder() / "small.ply");
+  for (const std::vector<std::string>& scene :
+       std::vector<std::vector<std::string>>{{"--scene", "builtin:object", "--size", "48x32", "--set",
+                                              "preprocess.sh_degree=0"},
+                                             {"--scene", "small.ply", "--fovy", "30"},
+                                             {"--scene", "train=small.ply", "--size", "48x32"},
+                                             {"--scene", "small.ply", "--size", "48x32", "--orthographic", "3"}}) {
+    std::vector<std::string> command{"run", "--fidelity", "lt"};
+    command.insert(command.end(), scene.begin(), scene.end());
+    const std::string text = printed(command);
+    SCOPED_TRACE(text);
+    for (const char* option : {"size", "eye", "look-at", "up"})
+      EXPECT_NE(text.find(std::string("\n") + option + " = "), std::string::npos) << option;
+    write("printed.toml", text);
+    const json first = json_of(command), again = json_of({"run", "--config", "printed.toml"});
+    EXPECT_EQ(comparable(first), comparable(again));
+    EXPECT_FALSE(first["camera"].is_null());
+  }
+  EXPECT_NE(printed({"run", "--scene", "builtin:train"}).find("\nsize = \"980x545\" "), std::string::npos);
+  EXPECT_EQ(printed({"run", "--scene", "tiny.spl"}).find("\nsize = "), std::string::npos) << "it has no other";
+}
+
 TEST_F(ConfigFile, PrintedHasEveryParameterAndItsOrigin) {
   write("config.toml", "scene = \"tiny.spl\"\nplatform = \"mobile\"\n[set]\ntc.bin_quads = 16\n");
   const std::string text = printed({"run", "--config", "config.toml", "--set", "tgc.bins=7"});
@@ -275,6 +306,10 @@ TEST_F(ConfigFile, ThatSaysWhatIsSoAnywayChangesNothingInTheReport) {
 TEST_F(ConfigFile, ThatCannotBeUsedIsRefusedWithItsLine) {
   bad("sise = \"32x32\"\n", {"unknown key 'sise'", "config.toml:1", "did you mean size"});
   bad("scene = \"tiny.spl\"\n\nsize = \"32\"\n", {"config.toml:3", "--size", "WIDTHxHEIGHT"});
+  bad("fidelity = \"lt\"\nscene = \"nowhere.ply\"\n", {"cannot read scene (config.toml:2, nowhere.ply)"});
+  bad("fidelity = \"lt\"\nscene = \"train=nowhere.ply\"\n", {"cannot read scene (config.toml:2, nowhere.ply)"});
+  bad("scene = \"builtin:nowhere\"\n", {"config.toml:1, builtin:nowhere"});
+  bad("\nmesh = [\n  \"nowhere.obj\"]\n", {"cannot read mesh (config.toml:3, nowhere.obj)"});
   bad("[set]\n\ntc.bin = 4\n", {"'bin'", "config.toml:3", "tc.bins"});
   bad("[set]\ntc.bins = 0\n", {"config.toml:2", "tc.bins"});
   bad("[set]\n\ntc = 3\n", {"'tc'", "config.toml:3", "no UNIT.PARAMETER"});

@@ -197,6 +197,10 @@ TEST_F(DrawnBy, WhatTheyAreWithoutIsRefused) {
   bad({"run", "--variant", "software", "--unit", "accelerator=gcc"},
       {"accelerator=gcc", "no variant here draws with it"});
   bad({"run", "--variant", "software", "--set", "preparation.record_cycles=8"}, {"preparation", "no variant here"});
+  for (const char* unit : {"crop=in-shader", "gpc0.crop=in-shader"}) {
+    for (const char* variant : {"software", "accelerator"})
+      bad({"run", "--variant", variant, "--unit", unit}, {unit, "no variant here draws with it"});
+  }
   bad({"compare", "--variant", "baseline", "--variant", "m=software,accelerator=gcc"}, {"variant m", "accelerator"});
   bad({"compare", "--variant", "m=het,render=endless"}, {"'render'", "has none"});
   bad({"run", "--variant", "software", "--trace", "t.json"}, {"--trace", "variant software"});
@@ -222,9 +226,17 @@ TEST_F(DrawnBy, ReportsAndPagesHaveRunsWithoutQuads) {
                            "software: its cycles have the sorting of splats among them"})
     EXPECT_NE(finished.out.find(part), std::string::npos) << part;
   EXPECT_EQ(finished.out.find("nan"), std::string::npos);
-  EXPECT_NE(read_file(folder() / "page.html").find(">Over time<"), std::string::npos) << "of the pipelines";
+  const std::string page = read_file(folder() / "page.html");
+  EXPECT_NE(page.find(">Over time<"), std::string::npos) << "of the pipelines";
+  EXPECT_NE(page.find("<dt>termination</dt><dd>paper (not of software, accelerator)</dd>"), std::string::npos);
+  EXPECT_NE(page.find("Not known of software, accelerator."), std::string::npos) << "merged, when terminated";
   const Finished alone = vrpipe({"run", "--scene", "tiny.spl", "--variant", "software", "--html", "alone.html"});
   ASSERT_EQ(alone.code, 0) << alone.err;
+  const std::string own_page = read_file(folder() / "alone.html");
+  for (const char* absent : {"<dt>colour</dt>", "<dt>termination</dt>", "<dt>effects</dt>", "Fragments merged",
+                             "Cycle in which each pixel terminated"})
+    EXPECT_EQ(own_page.find(absent), std::string::npos) << absent;
+  EXPECT_NE(own_page.find("Fragments blended"), std::string::npos);
   EXPECT_EQ(alone.out.find("\nquads"), std::string::npos);
   EXPECT_NE(alone.out.find("unit cycles"), std::string::npos);
   EXPECT_NE(alone.out.find("colour and termination of its own"), std::string::npos) << "--format says nothing of it";

@@ -18,6 +18,7 @@
 #include "jobs/reproduce_findings.h"
 #include "jobs/reproduce_plan.h"
 #include "jobs/sensitivity_table.h"
+#include "output/reproduce_report.h"
 #include "output/reproduce_tables.h"
 
 namespace vrpipe::testing {
@@ -251,6 +252,13 @@ TEST(WholeFrames, ComeBackFromAJournal) {
   EXPECT_EQ(json(back), json(frame));
   EXPECT_EQ(back.accelerator, frame.accelerator);
   EXPECT_EQ(back.papers.sort, 5);
+}
+
+TEST_F(Synthetic, TheTextHeadsItsRows) {
+  const std::string text = tools::reproduction_text(tools::reproduction_of(result_), {});
+  const std::size_t heading = text.find("id  verdict             the paper says          measured here, difference\n");
+  ASSERT_NE(heading, std::string::npos) << text;
+  EXPECT_LT(heading, text.find("\nR1  differs             up to 2.78x             3.28x (truck), +18 %\n"));
 }
 
 TEST_F(Synthetic, RowsThatCouldNotHaveFailedDoNotCount) {

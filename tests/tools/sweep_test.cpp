@@ -509,6 +509,10 @@ TEST_F(Sweep, ThatCannotBeIsRefusedWithItsLine) {
   refused({"sweep", "study.toml", "--shard", "1/2", "--journal", "j", "--csv", "s.csv"},
           {"--csv", "a shard has not all points"});
   refused({"sweep", "study.toml", "--csv", "study.toml"}, {"study.toml"});
+  write("study.toml", "fidelity = \"functional\"\n[axes]\nscene = [\n  \"tiny.spl\",\n  \"nowhere.ply\"]\n");
+  refused({"sweep", "study.toml", "--jobs", "1"}, {"cannot read scene (study.toml:5, nowhere.ply): no such file"});
+  write("study.toml", "fidelity = \"functional\"\n[axes]\nscene = [\n  \"tiny.spl\",\n  \"builtin:nowhere\"]\n");
+  refused({"sweep", "study.toml"}, {"(study.toml:5, builtin:nowhere)"});
   refused({"sweep", "nowhere.toml"}, {"cannot read study (nowhere.toml): there is no such file"});
   refused({"sweep", "."}, {"cannot read study (.): it is a directory"});
   refused({"sweep"}, {"STUDY.toml"});

@@ -96,12 +96,21 @@ TEST_F(Variants, KeepAUnitOfTheirOwn) {
           {"--unit crop=color-rop", "a unit of its own in slot crop"});
   refused({"run", "--scene", "tiny.spl", "--variant", "own=het,tgc=pass-through", "--unit", "tgc=tile-grid-coalescing"},
           {"variant own has a unit of its own in slot tgc"});
+  refused({"compare", "--scene", "tiny.spl", "--variant", "in-shader", "--variant", "software", "--unit",
+           "crop=color-rop"},
+          {"--unit crop=color-rop", "variant in-shader has a unit of its own in slot crop"});
   const std::vector<std::string> both{"compare",   "--scene",   "tiny.spl", "--variant",     "baseline",
                                       "--variant", "in-shader", "--unit",   "crop=color-rop"};
   const json result = json_of(both);
   EXPECT_EQ(result["runs"][0]["implementations"]["crop"], "color-rop");
   EXPECT_EQ(result["runs"][1]["implementations"]["crop"], "in-shader");
   EXPECT_NE(vrpipe(both).out.find("crop=color-rop (not in in-shader, with its own)"), std::string::npos);
+  std::vector<std::string> on_a_page = both;
+  on_a_page.insert(on_a_page.end(), {"--variant", "software", "--fidelity", "functional", "--html", "page.html"});
+  EXPECT_EQ(vrpipe(on_a_page).code, 0);
+  EXPECT_NE(read_file(folder() / "page.html")
+                .find("crop = color-rop (not in in-shader, with its own; not in software, without crop)"),
+            std::string::npos);
 }
 
 TEST_F(Variants, HaveImagesOfTheirOwn) {

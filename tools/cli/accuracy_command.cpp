@@ -68,7 +68,8 @@ class AccuracyCommand : public Command {
     AccuracyJob job;
     job.simulation = arguments_.resolve(SimulationArguments::Variants::all, invocation());
     if (prints_config(invocation())) {
-      std::cout << config_text(invocation(), job.simulation.requests, job.simulation.preprocess_parameters);
+      std::cout << config_text(invocation(), job.simulation.requests, job.simulation.preprocess_parameters,
+                               camera_texts(job.simulation));
       return;
     }
     job.quick = quick_;

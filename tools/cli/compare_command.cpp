@@ -54,7 +54,7 @@ class CompareCommand : public Command {
     const std::optional<ViewsChoice> views = arguments_.views();
     const SimulationJob job = arguments_.resolve(SimulationArguments::Variants::all, invocation());
     if (prints_config(invocation())) {
-      std::cout << config_text(invocation(), job.requests, job.preprocess_parameters);
+      std::cout << config_text(invocation(), job.requests, job.preprocess_parameters, camera_texts(job));
       return;
     }
     if (views) {

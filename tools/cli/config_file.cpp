@@ -86,6 +86,12 @@ class ConfigReader : public TomlFile {
   const Arguments& arguments_;
 };
 
+/// As help calls its value.
+bool names_file(const Option& option) {
+  const std::string& type = option.value_name;
+  return type.find("FILE") != std::string::npos || type.find("DIR") != std::string::npos;
+}
+
 std::string key_of(const std::string& text) { return text.substr(0, text.find('=')); }
 
 /// Options whose values are merged key by key; of others those of the command line take the place of the file's.
@@ -97,9 +103,8 @@ bool is_merged(const std::string& option) {
 
 std::string with_file_of(const Option& option, const std::string& text,
                          const std::function<std::filesystem::path(const std::filesystem::path&)>& change) {
-  const std::string& type = option.value_name;
-  if (type.find("FILE") == std::string::npos && type.find("DIR") == std::string::npos) return text;
-  return with_file(text, type.find("NAME=FILE") != std::string::npos, change);
+  if (!names_file(option)) return text;
+  return with_file(text, option.value_name.find("NAME=FILE") != std::string::npos, change);
 }
 
 ConfigFile::ConfigFile(const std::filesystem::path& path, Arguments& arguments, const std::vector<std::string>& others)
@@ -127,6 +132,8 @@ void ConfigFile::read(Arguments& arguments, const std::vector<std::string>& othe
     if (std::find(others.begin(), others.end(), key) != others.end()) {
       reader.for_each_value(*node, [&](const std::string& name, const toml::node& value) {
         for (const std::string& called : {name, "axis " + name, "--" + name}) mention_node("", called, value);
+        if (name == "scene")
+          mention_file("", reader.value(value, name, *arguments.find("--scene")), value.source().begin.line);
       });
       continue;
     }
@@ -159,19 +166,20 @@ void ConfigFile::read(Arguments& arguments, const std::vector<std::string>& othe
     } else {
       const std::string& type = option->value_name;
       const toml::array* const list = node->as_array();
+      const auto add_value = [&](const toml::node& value, unsigned at) {
+        const std::string text = reader.value(value, key, *option);
+        add(option->name, is_merged(option->name) ? text : "", text, at);
+        if (names_file(*option)) mention_file(entries_.back().what(), text, at);
+      };
       // Of several numbers, as X,Y,Z, or several values of an option that can be repeated.
       if (list != nullptr && type.find(',') != std::string::npos && type.find('=') == std::string::npos) {
         std::string text;
         for (const toml::node& each : *list) text += (text.empty() ? "" : ",") + reader.scalar(each, key);
         add("--" + key, "", text, line);
       } else if (list != nullptr) {
-        for (const toml::node& each : *list) {
-          const std::string text = reader.value(each, key, *option);
-          add("--" + key, is_merged("--" + key) ? text : "", text, each.source().begin.line);
-        }
+        for (const toml::node& each : *list) add_value(each, each.source().begin.line);
       } else {
-        const std::string text = reader.value(*node, key, *option);
-        add("--" + key, is_merged("--" + key) ? text : "", text, line);
+        add_value(*node, line);
       }
     }
   }
@@ -243,6 +251,12 @@ void ConfigFile::mention(const std::string& entry, const std::string& key, const
   const std::size_t dot = key.rfind('.');
   if (dot != std::string::npos)
     mentions_.push_back({entry, fmt::format("'{}' (unit {}", key.substr(dot + 1), key.substr(0, dot)), line, {}});
+}
+
+void ConfigFile::mention_file(const std::string& entry, const std::string& text, unsigned line) {
+  for (const std::string& file : {text, text.substr(text.find('=') + 1)}) {
+    for (const char* end : {")", ","}) mentions_.push_back({entry, "(" + file + end, line, {}});
+  }
 }
 
 void ConfigFile::check_overridden(const Arguments& arguments) const {

@@ -53,6 +53,8 @@ class ConfigFile {
   /// Of UNIT.PARAMETER or SLOT, wherever it stands.
   void mention(const std::string& entry, const std::string& key, const std::string& value,
                const std::string& as_written, unsigned line);
+  /// Of a value that names a file, after NAME= or alone.
+  void mention_file(const std::string& entry, const std::string& text, unsigned line);
   void read(Arguments& arguments, const std::vector<std::string>& others);
   void apply(Arguments& arguments);
   std::string place(unsigned line) const;

@@ -64,7 +64,7 @@ class FramesCommand : public Command {
       units.insert(units.end(), job.kernel_units.begin(), job.kernel_units.end());
       auto parameters = job.preprocess_parameters;
       parameters.insert(parameters.end(), job.kernel_parameters.begin(), job.kernel_parameters.end());
-      std::cout << config_text(invocation(), requests, parameters);
+      std::cout << config_text(invocation(), requests, parameters, camera_texts(job));
       return;
     }
     if (const std::optional<ViewsChoice> views = arguments_.views()) {

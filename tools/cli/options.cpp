@@ -55,6 +55,9 @@ std::optional<std::size_t> view_count(const std::string& text) {
 }
 
 unsigned passes_of(const std::string& text) { return parse_count(text, "--multi-pass", most_passes); }
+unsigned seed_of(const std::string& text) {
+  return parse_count(text, "--seed", std::numeric_limits<std::uint32_t>::max());
+}
 unsigned draws_of(const std::string& text) { return parse_count(text, "--draws", most_draws); }
 
 /// Throws UserError where a setting's unit is known and cannot have it, whatever the platform and the variant.
@@ -73,49 +76,81 @@ void check_setting(const std::string& text) {
   if (of_unit != nullptr) of_unit->parameters->set(setting.unit, setting.parameter, setting.value);
 }
 
-/// Of one that is defined where it is chosen what can be said without the others.
-void check_variant(const std::string& text) {
-  if (text.find('=') != std::string::npos) {
-    parse_variant(text);
-  } else {
-    variant_named(text);
-  }
-}
-
 void check_unit(const std::string& text) {
   const UnitChoice choice = parse_unit_choices({text}).front();
   Registry::instance().find(without_gpc(choice.slot), choice.implementation);
 }
 
+/// What can be said without the others, of which one may be the base.
+void check_definition(const std::string& text) {
+  for (const auto& [key, value] : parse_variant(text).changes) {
+    const bool is_unit = Registry::instance().has_slot(without_gpc(key));
+    (is_unit ? check_unit : check_setting)(key + "=" + value);
+  }
+}
+
+/// A configuration file's [variants].
+void declare_definitions(Arguments& arguments, Values& definitions) {
+  arguments.add_option("--define", definitions, "NAME=BASE,...", "", "").check = check_definition;
+}
+
+void check_variant(const std::string& text) {
+  if (text.find('=') != std::string::npos) {
+    check_definition(text);
+  } else {
+    variant_named(text);
+  }
+}
+
+/// A camera that has the value alone.
+void check_fovy(const std::string& text) {
+  View view;
+  view.fovy_degrees = parse_number(text, "--fovy");
+  look_at(view, {1, 1});
+}
+void check_orthographic(const std::string& text) {
+  View view;
+  view.orthographic_height = parse_number(text, "--orthographic");
+  look_at(view, {1, 1});
+}
+
 /// Whether it draws with kernels, or by an accelerator.
 bool is_outside(const Variant& variant) { return !variant.is_of_pipeline(); }
 
-/// What is for kernels and accelerators, where no variant draws with these.
+/// A unit of a slot with which no variant draws; a setting only if it is for kernels and accelerators: a configuration file
+/// may set everything.
 void refuse_unused(const RunRequest& request, const std::vector<Variant>& variants) {
   const bool draws_outside = std::any_of(variants.begin(), variants.end(), is_outside);
   const auto check = [&](const std::string& option, const std::string& slot) {
     const auto uses = [&](const Variant& variant) { return draws_with(variant, slot); };
-    if (!is_outside_pipeline(slot) || std::any_of(variants.begin(), variants.end(), uses)) return;
+    if (std::any_of(variants.begin(), variants.end(), uses)) return;
     throw UserError("cannot choose or set '" + slot + "'", option,
                     draws_outside ? "no variant here draws with it" : "it is no unit of a draw by hardware",
                     "leave it out, or take a variant that draws with it, or `vrpipe frames`");
   };
-  for (const Setting& setting : request.settings)
-    check("--set " + setting.unit + "." + setting.parameter, setting.unit);
+  for (const Setting& setting : request.settings) {
+    if (is_outside_pipeline(setting.unit)) check("--set " + setting.unit + "." + setting.parameter, setting.unit);
+  }
   for (const UnitChoice& choice : request.units)
-    check("--unit " + choice.slot + "=" + choice.implementation, choice.slot);
+    check("--unit " + choice.slot + "=" + choice.implementation, without_gpc(choice.slot));
 }
 
-/// A unit for all that no variant takes.
+/// A unit for all that no variant takes, after refuse_unused().
 void refuse_overridden(const std::vector<UnitChoice>& units, const std::vector<Variant>& variants) {
   for (const UnitChoice& choice : units) {
-    const UnitChoice* own = nullptr;
-    const auto has_own = [&](const Variant& variant) { return (own = own_unit(variant, choice)) != nullptr; };
-    if (!std::all_of(variants.begin(), variants.end(), has_own)) continue;
+    const Variant* other = nullptr;
+    const auto takes = [&](const Variant& variant) {
+      if (!draws_with(variant, without_gpc(choice.slot))) return false;
+      if (own_unit(variant, choice) == nullptr) return true;
+      other = &variant;
+      return false;
+    };
+    if (std::any_of(variants.begin(), variants.end(), takes)) continue;
+    const UnitChoice& own = *own_unit(*other, choice);
     throw UserError("cannot choose a unit for '" + choice.slot + "'",
                     "--unit " + choice.slot + "=" + choice.implementation,
-                    fmt::format("variant {} has a unit of its own in slot {}, {}", variants.back().name, own->slot,
-                                own->implementation),
+                    fmt::format("variant {} has a unit of its own in slot {}, {}", other->name, own.slot,
+                                own.implementation),
                     "leave it out, or take another variant");
   }
 }
@@ -199,9 +234,8 @@ void SimulationArguments::declare_scene(Arguments& arguments) {
       parse_triple(text, option, "X,Y,Z", "0,-1,0");
     };
   }
-  for (const char* option : {"--fovy", "--orthographic"}) {
-    arguments.find(option)->check = [option](const std::string& text) { parse_number(text, option); };
-  }
+  arguments.find("--fovy")->check = check_fovy;
+  arguments.find("--orthographic")->check = check_orthographic;
   arguments.add_flag("--no-scene-cache", no_scene_cache_,
                      "makes a built-in scene anew, instead of reading what the same build has made\n"
                      "before from the user's cache folder",
@@ -248,7 +282,7 @@ void SimulationArguments::declare_rules(Arguments& arguments) {
 
 void SimulationArguments::declare_study(Arguments& arguments) {
   declare_scene(arguments);
-  arguments.add_option("--define", definitions_, "NAME=BASE,...", "", "");
+  declare_definitions(arguments, definitions_);
   declare_platform(arguments);
   declare_variant(arguments);
   declare_changes(arguments);
@@ -260,7 +294,7 @@ void SimulationArguments::declare_study(Arguments& arguments) {
 void SimulationArguments::declare(Arguments& arguments, Variants variants) {
   declare_scene(arguments);
   declare_config(arguments);
-  arguments.add_option("--define", definitions_, "NAME=BASE,...", "", "");
+  declare_definitions(arguments, definitions_);
   declare_platform(arguments);
   if (variants == Variants::one) declare_variant(arguments);
   declare_changes(arguments);
@@ -319,7 +353,7 @@ void SimulationArguments::declare_whole_frames(Arguments& arguments) {
   takes_kernels_ = true;
   declare_scene(arguments);
   declare_config(arguments);
-  arguments.add_option("--define", definitions_, "NAME=BASE,...", "", "");
+  declare_definitions(arguments, definitions_);
   declare_platform(arguments);
   declare_changes(arguments);
   declare_rules(arguments);
@@ -419,6 +453,8 @@ void SimulationArguments::declare_error(Arguments& arguments) {
                        "sampled or cycle",
                        rules_group);
   arguments.add_option("--seed", seed_, "N", "of where the windows of a sampled run are (default: 1)", rules_group);
+  arguments.find("--error")->check = [](const std::string& text) { parse_percent(text, "--error"); };
+  arguments.find("--seed")->check = seed_of;
 }
 
 void SimulationArguments::choose_error(RunRequest& request) const {
@@ -431,7 +467,7 @@ void SimulationArguments::choose_error(RunRequest& request) const {
   if (const auto text = single(seed_, "--seed")) {
     if (!request.sampling)
       throw UserError("cannot use option", "--seed", "nothing is drawn at random", "add --fidelity sampled or --error");
-    request.sampling->seed = parse_count(*text, "--seed", std::numeric_limits<std::uint32_t>::max());
+    request.sampling->seed = seed_of(*text);
   }
 }
 
@@ -467,7 +503,8 @@ void SimulationArguments::declare_views(Arguments& arguments) {
   arguments.find(ViewsChoice::option)->check = view_count;
   arguments.add_option(ViewsChoice::journal_option, journal_, "FILE",
                        "where --views stores what is done, and goes on from; it stays (default: a\n"
-                       "file in the user's cache folder, removed at the end)",
+                       "file in the user's cache folder, removed at the end, or by a later study when\n"
+                       "it was left alone for 30 days)",
                        result_group);
 }
 

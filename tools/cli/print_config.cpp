@@ -95,8 +95,9 @@ std::string kind_of(const std::string& parameter) {
 
 class ConfigWriter {
  public:
-  ConfigWriter(const Invocation& invocation, const std::vector<RunRequest>& requests)
-      : invocation_(invocation), requests_(requests) {}
+  ConfigWriter(const Invocation& invocation, const std::vector<RunRequest>& requests,
+               const std::map<std::string, std::string>& camera)
+      : invocation_(invocation), requests_(requests), camera_(camera) {}
 
   std::string options() const {
     std::string text;
@@ -184,6 +185,8 @@ class ConfigWriter {
 
   std::string option_line(const Option& option, const std::string& name) const {
     const bool has_default = !option.default_text.empty() && !is_given(option.default_unless);
+    if (const auto of_scene = camera_.find(name); !option.is_given() && of_scene != camera_.end())
+      return line_of(name, value_text(of_scene->second), "scene");
     if (!option.is_given() && !has_default) {
       return fmt::format("{:<{}} # {}\n", "# " + name, comment_column, default_of(option));
     }
@@ -226,9 +229,30 @@ class ConfigWriter {
 
   const Invocation& invocation_;
   const std::vector<RunRequest>& requests_;
+  const std::map<std::string, std::string>& camera_;
 };
 
 }  // namespace
+
+std::map<std::string, std::string> camera_texts(const SimulationJob& job) {
+  for (const FrameCommand& command : job.frame.commands) {
+    if (job.scene.camera || !command.draw || command.draw->is_mesh) continue;
+    SceneRequest request = job.scene;
+    request.scene = command.draw->scene;
+    const std::optional<Viewpoint> viewpoint = viewpoint_of(request);
+    if (!viewpoint) continue;
+    const View& view = *viewpoint->view;
+    const auto triple = [](const Vec3& of) { return fmt::format("{},{},{}", of[0], of[1], of[2]); };
+    std::map<std::string, std::string> texts{{"size",
+                                              fmt::format("{}x{}", viewpoint->camera.width, viewpoint->camera.height)},
+                                             {"eye", triple(view.eye)},
+                                             {"look-at", triple(view.look_at)},
+                                             {"up", triple(view.up)}};
+    if (!view.orthographic_height) texts.emplace("fovy", fmt::format("{}", view.fovy_degrees));
+    return texts;
+  }
+  return {};
+}
 
 bool prints_config(const Invocation& invocation) {
   const Option* const option = invocation.arguments->find("--print-config");
@@ -236,8 +260,9 @@ bool prints_config(const Invocation& invocation) {
 }
 
 std::string config_text(const Invocation& invocation, const std::vector<RunRequest>& requests,
-                        const std::vector<std::pair<std::string, std::string>>& preprocess) {
-  const ConfigWriter writer(invocation, requests);
+                        const std::vector<std::pair<std::string, std::string>>& preprocess,
+                        const std::map<std::string, std::string>& camera) {
+  const ConfigWriter writer(invocation, requests, camera);
   // What is known by its place has no key.
   std::string command = invocation.arguments->command();
   for (const Option& option : invocation.arguments->options()) {

@@ -98,7 +98,8 @@ class ReproduceCommand : public Command {
     arguments.add_option("--markdown", markdown_, "FILE", "writes the page of the documentation", result_group);
     arguments.add_option(ReproduceJob::journal_option, journal_, "FILE",
                          "where is stored what is done, to go on from after an interruption; it stays\n"
-                         "(default: a file in the user's cache folder, removed at the end)",
+                         "(default: a file in the user's cache folder, removed at the end, or by a later\n"
+                         "study when it was left alone for 30 days)",
                          result_group);
     declare_jobs(arguments, jobs_);
     arguments.set_footer(

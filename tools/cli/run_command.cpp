@@ -42,7 +42,7 @@ class RunCommand : public Command {
   void run() override {
     const SimulationJob job = arguments_.resolve(SimulationArguments::Variants::one, invocation());
     if (prints_config(invocation())) {
-      std::cout << config_text(invocation(), job.requests, job.preprocess_parameters);
+      std::cout << config_text(invocation(), job.requests, job.preprocess_parameters, camera_texts(job));
       return;
     }
     print_result(job, perform(job));

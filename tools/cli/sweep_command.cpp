@@ -99,7 +99,8 @@ class SweepCommand : public Command {
                          result_group);
     arguments.add_option(SweepJob::journal_option, journal_, "FILE",
                          "where is stored what is done, to go on from after an interruption; it stays\n"
-                         "(default: a file in the user's cache folder, removed at the end)",
+                         "(default: a file in the user's cache folder, removed at the end, or by a later\n"
+                         "study when it was left alone for 30 days)",
                          result_group);
     arguments.set_footer(
         "Simulates every point of a study, prints which axes matter and which GPUs are worth it, and writes the\n"

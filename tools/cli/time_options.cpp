@@ -87,6 +87,10 @@ void TimeArguments::declare(Arguments& arguments, const std::string& group, bool
       count->check = [option](const std::string& text) { parse_count(text, option, longest_interval); };
     }
   }
+  for (const char* option : {Trace::option, EventLog::option}) {
+    if (Option* const window = arguments.find(option))
+      window->check = [option](const std::string& text) { parse_window(text, option); };
+  }
   arguments.add_flag(HeatMaps::option, heat_maps_,
                      "with --output: writes maps of the fragments of each pixel and screen tile,\n"
                      "SCENE-VARIANT-pixels-*.png and .exr, -tiles-*.png and .exr",

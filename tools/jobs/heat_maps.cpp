@@ -80,8 +80,8 @@ nlohmann::ordered_json legend(const std::vector<NamedChannel>& channels) {
 }  // namespace
 
 HeatMaps::HeatMaps(std::uint32_t width, std::uint32_t height, const RunRequest& request)
-    : has_time_(has_course(request)),
-      is_of_pipeline_(request.variant.is_of_pipeline()),
+    : drawn_by_(request.variant.drawn_by),
+      has_time_(has_course(request) && request.variant.is_of_pipeline()),
       fates_(width, height),
       cycles_(width, height) {}
 
@@ -106,7 +106,9 @@ void HeatMaps::attach(Observers& observers, bool terminates) {
 std::vector<NamedChannel> HeatMaps::of_pixels() const {
   const std::size_t pixels = std::size_t{fates_.width()} * fates_.height();
   std::vector<NamedChannel> channels;
+  if (drawn_by_ == DrawnBy::accelerator) return channels;
   for (unsigned fate = 0; fate < fragment_fates; ++fate) {
+    if (drawn_by_ == DrawnBy::software && static_cast<FragmentFate>(fate) == FragmentFate::merged) continue;
     NamedChannel& channel = channels.emplace_back(NamedChannel{fate_names[fate], std::vector<float>(pixels)});
     for (std::size_t i = 0; i < pixels; ++i) channel.values[i] = fates_.values()[4 * i + fate];
   }
@@ -153,11 +155,7 @@ std::vector<std::filesystem::path> HeatMaps::files(const std::string& stem, Fide
 
 void HeatMaps::write(const std::string& stem, ResultFiles& files) const {
   const std::uint32_t width = fates_.width(), height = fates_.height();
-  std::vector<NamedChannel> pixels = of_pixels();
-  const auto is_missing = [&](const NamedChannel& channel) {
-    return !is_of_pipeline_ && (channel.name == merged_name || channel.name == cycle_name);
-  };
-  pixels.erase(std::remove_if(pixels.begin(), pixels.end(), is_missing), pixels.end());
+  const std::vector<NamedChannel> pixels = of_pixels();
   const std::vector<NamedChannel> tiles = of_tiles(pixels);
   const nlohmann::ordered_json legends{{pixels_name, legend(pixels)}, {tiles_name, legend(tiles)}};
   files.write(legend_name(stem), legends.dump(2) + "\n", option);

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstdlib>
+#include <regex>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -78,6 +79,19 @@ nlohmann::json binaries(nlohmann::json value, unsigned depth) {
   return value;
 }
 
+/// Of runs that nobody took up again; `own` stays.
+void remove_abandoned(const fs::path& folder, const fs::path& own) {
+  std::error_code error;
+  const auto now = fs::file_time_type::clock::now();
+  static const std::regex name("[a-z]+-[0-9a-f]{16}\\.jsonl");  // what users name stays
+  for (fs::directory_iterator each(folder, error), end; !error && each != end; each.increment(error)) {
+    if (each->path() == own || !std::regex_match(each->path().filename().string(), name)) continue;
+    std::error_code ignored;
+    const auto written = each->last_write_time(ignored);
+    if (!ignored && now - written > Journal::kept_in_cache) fs::remove(each->path(), ignored);
+  }
+}
+
 }  // namespace
 
 nlohmann::json with_binaries(nlohmann::json value) {
@@ -119,6 +133,7 @@ Journal Journal::in_cache(const std::string& name, const nlohmann::json& head, c
   if (folder) {
     std::error_code error;
     fs::create_directories(*folder, error);
+    remove_abandoned(*folder, journal.path_);
     try {
       journal.open(head);
       return journal;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -16,7 +17,8 @@ namespace vrpipe::tools {
 class Journal {
  public:
   /// In the user's cache folder, by what it belongs to; removed by finish(). What keeps it from being used is said on
-  /// stderr, after `option`, and the run goes on without.
+  /// stderr, after `option`, and the run goes on without. Removes others to which nothing was added for `kept_in_cache`.
+  static constexpr std::chrono::hours kept_in_cache{30 * 24};
   static Journal in_cache(const std::string& name, const nlohmann::json& head, const std::string& option);
   /// In a file that the user named, which stays.
   /// @throws UserError when it cannot be used, or belongs to something else

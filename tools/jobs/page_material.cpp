@@ -40,19 +40,28 @@ std::vector<HeatRow> heat_rows(const std::vector<std::unique_ptr<HeatMaps>>& hea
   std::vector<std::vector<NamedChannel>> of_run(heat.size());
   for_each_chunk(heat.size(), threads, [&](std::uint64_t run) { of_run[run] = heat[run]->of_pixels(); });
   std::vector<HeatRow> rows;
-  for (std::size_t i = 0; !of_run.empty() && i < of_run.front().size(); ++i) {
+  if (of_run.empty()) return rows;
+  const auto most =
+      std::max_element(of_run.begin(), of_run.end(), [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  for (const NamedChannel& named : *most) {
     HeatRow& row = rows.emplace_back();
-    row.name = of_run.front()[i].name;
+    row.name = named.name;
+    std::vector<const std::vector<float>*> values;
     for (const std::vector<NamedChannel>& channels : of_run) {
-      HeatPicture& map = row.of_run.emplace_back();
-      for (const float value : channels[i].values) {
+      const auto channel = std::find_if(channels.begin(), channels.end(),
+                                        [&](const NamedChannel& each) { return each.name == named.name; });
+      values.push_back(channel == channels.end() ? nullptr : &channel->values);
+      row.of_run.emplace_back();
+      if (values.back() == nullptr) continue;
+      HeatPicture& map = row.of_run.back().emplace();
+      for (const float value : *values.back()) {
         map.sum += static_cast<double>(value);
         map.largest = std::max(map.largest, static_cast<double>(value));
       }
       row.brightest = std::max(row.brightest, map.largest);
     }
     for_each_chunk(heat.size(), threads, [&](std::uint64_t run) {
-      row.of_run[run].picture = smaller_map(of_run[run][i].values, width, height, row.brightest);
+      if (values[run] != nullptr) row.of_run[run]->picture = smaller_map(*values[run], width, height, row.brightest);
     });
   }
   return rows;

@@ -24,9 +24,9 @@ struct HeatPicture {
 
 /// Maps of one name, on one scale.
 struct HeatRow {
-  std::string name;                 ///< as HeatMaps names it
-  double brightest = 0;             ///< value of the brightest colour; 0 where all is black
-  std::vector<HeatPicture> of_run;  ///< one for each run
+  std::string name;                                ///< as HeatMaps names it
+  double brightest = 0;                            ///< value of the brightest colour; 0 where all is black
+  std::vector<std::optional<HeatPicture>> of_run;  ///< one for each run; none where it does not tell
 };
 
 /// What only a page shows of the runs of a job.

@@ -43,7 +43,6 @@ std::vector<std::unique_ptr<HeatMaps>> observe_heat(std::vector<RunRequest>& req
   for (RunRequest& request : requests) {
     if (request.observers == nullptr) request.observers = std::make_shared<Observers>();
     maps.push_back(std::make_unique<HeatMaps>(width, height, request));
-    // An accelerator does not tell; its maps stay black.
     if (request.variant.drawn_by != DrawnBy::accelerator)
       maps.back()->attach(*request.observers, request.variant.early_termination);
   }

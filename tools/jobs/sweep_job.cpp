@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -19,7 +20,10 @@
 #include <vrpipe/component/error.h>
 #include <vrpipe/component/printable.h>
 #include <vrpipe/platforms/software.h>
+#include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/exact_image.h>
+#include <vrpipe/workloads/gaussian_file.h>
+#include <vrpipe/workloads/scene_substitution.h>
 
 #include "image/image_error.h"
 #include "jobs/energy.h"
@@ -205,6 +209,19 @@ class ExactImages {
   std::map<std::tuple<std::string, std::string, std::string, PreprocessOptions>, OfScene> scenes_;
 };
 
+/// Throws UserError for one that is not there, before others are drawn.
+void check_scene(const SweepJob& job, const std::string& value) {
+  SceneRequest request;
+  request.scene = scene_file(scene_of_axis(job, value));
+  const std::string builtin = "builtin:";
+  std::error_code ignored;
+  if (request.scene.rfind(builtin, 0) == 0) {
+    builtin_scene_named(request.scene.substr(builtin.size()));
+  } else if (!std::filesystem::exists(gaussian_file_path(request.scene), ignored)) {
+    open_scene(request);
+  }
+}
+
 void check_views(const SweepJob& job) {
   for (const StudyAxis& axis : job.study.axes) {
     for (const std::string& value : axis.values) {
@@ -215,6 +232,7 @@ void check_views(const SweepJob& job) {
                         "give 0, 1, ... round the scene, or camera = FILE");
       }
       if (axis.name == "size") static_cast<void>(size_of(value));
+      if (axis.name == "scene") check_scene(job, value);
       if (axis.name == "multi-pass" && (!is_count || std::stoul(value) < 1))
         throw UserError("bad value '" + value + "'", "axis multi-pass", "it is no whole number from 1", "give e.g. 8");
     }

@@ -241,7 +241,7 @@ AccuracyTable fidelity_table(const AccuracyResult& result) {
                    "events",
                    "blended +- %",
                    "image, dB",
-                   "says, %"};
+                   "may err"};
   for (const FidelityLevel& level : result.fidelity) {
     const RunResult& run = level.run;
     table.rows.push_back(
@@ -388,7 +388,8 @@ std::string fidelity_verdict(const AccuracyResult& result) {
 std::string fidelity_definition(const AccuracyResult& result) {
   return fmt::format(
       "dominated: another fidelity of the variant is better in CPU seconds (by over {:g} %) or in error (by over {:g} "
-      "points) and no worse in the other; {}, which errors are measured against, never is",
+      "points) and no worse in the other; {}, which errors are measured against, never is; may err: by how many % the "
+      "run itself says that its cycles may be off",
       100 * fidelity_tolerance.cost_share, fidelity_tolerance.error, most_exact_text(result));
 }
 

@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 
 #include <vrpipe/component/printable.h>
+#include <vrpipe/platforms/netlist.h>
+#include <vrpipe/platforms/software.h>
 
 #include "jobs/comparison.h"
 #include "jobs/user_variants.h"
@@ -42,14 +44,8 @@ std::string common_text(const RunRequest& request, const std::vector<Setting>& p
     for (const Setting& setting : *settings)
       add("", fmt::format("{}.{}={}", setting.unit, setting.parameter, setting.value));
   }
-  for (const UnitChoice& unit : request.units) {
-    std::vector<std::string> others;
-    for (const Variant* variant : variants) {
-      if (own_unit(*variant, unit) != nullptr) is_first(variant->name, others);
-    }
-    add("", fmt::format("{}={}", unit.slot, unit.implementation) +
-                (others.empty() ? "" : printable(fmt::format(" (not in {}, with its own)", fmt::join(others, ", ")))));
-  }
+  for (const UnitChoice& unit : request.units)
+    add("", fmt::format("{}={}", unit.slot, unit.implementation) + printable(not_taken_text(unit, variants)));
   return text.empty() ? text : text + "\n";
 }
 
@@ -58,6 +54,26 @@ std::string platform_line(const Platform& platform, const TextStyle& style) {
 }
 
 }  // namespace
+
+std::string not_taken_text(const UnitChoice& unit, const std::vector<const Variant*>& variants) {
+  const std::string slot = without_gpc(unit.slot);
+  std::vector<std::string> with_own, without;
+  for (const Variant* variant : variants) {
+    if (!draws_with(*variant, slot)) {
+      is_first(variant->name, without);
+    } else if (own_unit(*variant, unit) != nullptr) {
+      is_first(variant->name, with_own);
+    }
+  }
+  std::string text;
+  const auto add = [&](const std::vector<std::string>& names, const std::string& why) {
+    if (names.empty()) return;
+    text += fmt::format("{}not in {}, {}", text.empty() ? " (" : "; ", fmt::join(names, ", "), why);
+  };
+  add(with_own, "with its own");
+  add(without, "without " + slot);
+  return text.empty() ? text : text + ")";
+}
 
 std::string machines_text(const std::vector<RunResult>& runs, const std::vector<Setting>& preprocessing,
                           std::uint32_t passes, const TextStyle& style, const std::vector<std::string>& axes) {

@@ -16,6 +16,9 @@ namespace vrpipe::tools {
 std::string machines_text(const std::vector<RunResult>& runs, const std::vector<Setting>& preprocessing,
                           std::uint32_t passes, const TextStyle& style, const std::vector<std::string>& axes = {});
 
+/// Which variants do not take a unit that is chosen for all, and why; empty if all do.
+std::string not_taken_text(const UnitChoice& unit, const std::vector<const Variant*>& variants);
+
 /// Of a run whose platform and settings alone matter.
 std::string machine_text(const RunRequest& request, const TextStyle& style);
 

@@ -10,6 +10,7 @@
 #include "jobs/comparison.h"
 #include "jobs/user_variants.h"
 #include "output/compare_sections.h"
+#include "output/machines_text.h"
 #include "output/report.h"
 #include "output/result_json.h"
 #include "output/svg_plot.h"
@@ -60,6 +61,16 @@ std::string scene_text(const JobResult& result) {
   return text;
 }
 
+/// What is the pipeline's alone, where a run is drawn otherwise; empty where none is of the pipeline.
+std::string of_pipeline(const std::string& text, const JobResult& result) {
+  std::vector<std::string> others;
+  for (const RunResult& run : result.runs) {
+    if (!run.request.variant.is_of_pipeline()) others.push_back(name_of(run.request));
+  }
+  if (others.size() == result.runs.size()) return {};
+  return text + (others.empty() ? "" : fmt::format(" (not of {})", fmt::join(others, ", ")));
+}
+
 std::string settings_line(const JobResult& result) {
   const RunRequest& request = result.runs.front().request;
   std::string text;
@@ -69,7 +80,10 @@ std::string settings_line(const JobResult& result) {
       add(fmt::format("{}.{} = {}", setting.unit, setting.parameter, setting.value));
     }
   }
-  for (const UnitChoice& unit : request.units) add(unit.slot + " = " + unit.implementation);
+  std::vector<const Variant*> variants;
+  for (const RunResult& run : result.runs) variants.push_back(&run.request.variant);
+  for (const UnitChoice& unit : request.units)
+    add(unit.slot + " = " + unit.implementation + not_taken_text(unit, variants));
   return text;
 }
 
@@ -117,8 +131,8 @@ std::string heading_section(const JobResult& result) {
   const RunRequest& request = result.runs.front().request;
   Terms terms;
   terms.add("scene", scene_text(result));
-  terms.add("image",
-            fmt::format("{}x{} pixels, {} colour", result.width, result.height, vrpipe::name_of(request.format)));
+  terms.add("image", fmt::format("{}x{} pixels", result.width, result.height));
+  terms.add("colour", of_pipeline(vrpipe::name_of(request.format), result));
   terms.add("camera", camera_text(result));
   std::vector<std::string> seen;
   const auto is_first = [&](const std::string& name) {
@@ -134,8 +148,8 @@ std::string heading_section(const JobResult& result) {
     }
   }
   terms.add("fidelity", fidelity_of(request));
-  terms.add("termination", name_of(request.termination));
-  terms.add("effects", request.effects.text());
+  terms.add("termination", of_pipeline(name_of(request.termination), result));
+  terms.add("effects", of_pipeline(request.effects.text(), result));
   if (result.passes > 1) terms.add("passes", fmt::format("{}", result.passes));
   terms.add("settings", settings_line(result));
   std::string names;

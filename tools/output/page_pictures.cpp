@@ -116,23 +116,29 @@ std::string heat_section(const JobResult& result) {
   CsvText csv({"run", "map", "sum", "largest"});
   for (const HeatRow& row : result.page.heat) {
     for (std::size_t i = 0; i < result.runs.size(); ++i) {
-      csv.row({name_of(result.runs[i].request), row.name, fmt::format("{:.0f}", row.of_run[i].sum),
-               fmt::format("{:.0f}", row.of_run[i].largest)});
+      if (const auto& map = row.of_run[i])
+        csv.row({name_of(result.runs[i].request), row.name, fmt::format("{:.0f}", map->sum),
+                 fmt::format("{:.0f}", map->largest)});
     }
     if (row.brightest <= 0) continue;
     text += "<h3>" + html_escaped(title_of(row.name)) + "</h3>\n" + scale(row);
     text += fmt::format("<div class=\"maps\" style=\"grid-template-columns:repeat({},minmax(0,{}px))\">\n",
                         std::min<std::size_t>(result.runs.size(), 4), PageMaterial::largest_heat_width);
-    std::string without;
+    std::string without, unknown;
+    const auto add = [](std::string& names, const std::string& name) { names += (names.empty() ? "" : ", ") + name; };
     // What is rasterised is mostly the same in all runs.
-    const bool is_of_all = std::all_of(row.of_run.begin(), row.of_run.end(), [&](const HeatPicture& map) {
-      return map.picture.rgb == row.of_run.front().picture.rgb;
+    const bool is_of_all = std::all_of(row.of_run.begin(), row.of_run.end(), [&](const auto& map) {
+      return map && row.of_run.front() && map->picture.rgb == row.of_run.front()->picture.rgb;
     });
     for (std::size_t i = 0; i < result.runs.size(); ++i) {
-      const HeatPicture& map = row.of_run[i];
       const std::string name = name_of(result.runs[i].request);
+      if (!row.of_run[i]) {
+        add(unknown, name);
+        continue;
+      }
+      const HeatPicture& map = *row.of_run[i];
       if (map.largest <= 0) {
-        without += (without.empty() ? "" : ", ") + name;
+        add(without, name);
         continue;
       }
       if (is_of_all && i > 0) break;
@@ -144,6 +150,7 @@ std::string heat_section(const JobResult& result) {
     }
     text += "</div>\n";
     if (!without.empty()) text += "<p class=\"subtle\">None in " + html_escaped(without) + ".</p>\n";
+    if (!unknown.empty()) text += "<p class=\"subtle\">Not known of " + html_escaped(unknown) + ".</p>\n";
   }
   if (text.empty()) return {};
   return "<p>Maps of one kind share a scale, which rises in lightness. <code>--heat-maps</code> writes them in full, "

@@ -60,7 +60,8 @@ std::string reproduction_markdown(const Reproduction& of) {
     rows.push_back({row.id, row.what, row.section, row.says, finding.measured, difference_text(finding),
                     verdict_text(of, finding), why_text(finding)});
   }
-  text += table_markdown({"id", "what", "paper", "its number", "here", "difference", "verdict", "why, or how measured"},
+  text += table_markdown({"id", "what", "section of the paper", "the paper says", "measured here", "difference",
+                          "verdict", "why, or how measured"},
                          rows);
   for (const ReportTable& table : all_tables(of)) {
     text += "## " + table.title + "\n\n" + table_markdown(table.heading, table.rows);

@@ -44,8 +44,9 @@ std::string section(const ReportTable& table, const std::string& plot) {
 
 std::string rows_html(const Reproduction& of) {
   std::string text =
-      "<h2>Row by row</h2>\n<table class=\"rows\">\n<tr><th></th><th>what</th><th>paper</th><th>its number</th>"
-      "<th>here</th><th>difference</th><th>verdict</th><th>why, or how measured</th></tr>\n";
+      "<h2>Row by row</h2>\n<table class=\"rows\">\n<tr><th>id</th><th>what</th><th>section of the paper</th>"
+      "<th>the paper says</th><th>measured here</th><th>difference</th><th>verdict</th><th>why, or how "
+      "measured</th></tr>\n";
   for (const RowFinding& finding : of.rows) {
     const PaperRow& row = *finding.row;
     const char* const kind = finding.verdict == Verdict::agrees    ? "agrees"

@@ -11,6 +11,9 @@ namespace vrpipe::tools {
 namespace {
 
 constexpr std::size_t page_width = 80;
+constexpr std::size_t table_width = page_width + 20;
+/// Of the first line of a row: id, verdict, what the paper says; what was measured follows.
+constexpr const char* row_form = "{:4}{:20}{:24}";
 
 std::string indented(const std::string& text, std::size_t indent = 0) {
   std::string lines;
@@ -22,14 +25,15 @@ std::string indented(const std::string& text, std::size_t indent = 0) {
 std::string row_text(const Reproduction& of, const RowFinding& finding, const TextStyle& style) {
   const PaperRow& row = *finding.row;
   const std::string verdict = fmt::format("{:20}", verdict_text(of, finding));
-  std::string text = fmt::format("{:4}{}{:24}", row.id,
+  std::string text = fmt::format(row_form, row.id,
                                  finding.verdict == Verdict::agrees    ? style.good(verdict)
                                  : finding.verdict == Verdict::differs ? style.bold(verdict)
                                                                        : style.dim(verdict),
                                  row.says);
   const std::string measured = finding.measured.empty() ? "-" : finding.measured;
   const std::string difference = difference_text(finding);
-  const bool is_short = measured.size() + difference.size() < 30;
+  constexpr std::size_t before = 4 + 20 + 24;  // as row_form has it
+  const bool is_short = measured.size() + 2 + difference.size() <= table_width - before;
   text += (is_short ? measured + (difference.empty() ? "" : ", " + difference) : difference) + "\n";
   constexpr std::size_t indent = 4;
   text += style.dim(indented(fmt::format("{}; paper {}", row.what, row.section), indent));
@@ -44,7 +48,7 @@ std::string table_text(const ReportTable& table, const TextStyle& style) {
   for (const auto& row : table.rows) text.row(row);
   if (has_words) {
     text.left(table.heading.size() - 1);
-    text.wrap(page_width + 20);
+    text.wrap(table_width);
   }
   std::string all = style.bold(table.title) + "\n" + text.text(style);
   if (!table.note.empty()) all += indented(table.note);
@@ -57,6 +61,10 @@ std::string reproduction_text(const Reproduction& of, const TextStyle& style) {
   std::string text = style.bold("The paper's results, reproduced") + "\n";
   for (const std::string& line : reproduction_heading(of)) text += indented(line);
   text += "\n";
+  text += style.bold(fmt::format(row_form, "id", "verdict", "the paper says") + "measured here, difference") + "\n";
+  text +=
+      style.dim("    what of; section of the paper; what was measured if it is long; why it differs or is not judged") +
+      "\n\n";
   for (const RowFinding& row : of.rows) text += row_text(of, row, style);
   text += "\n" + style.bold(verdict_summary(of)) + "\n";
   for (const ReportTable& table : all_tables(of)) text += "\n" + table_text(table, style);

@@ -65,8 +65,8 @@ void add_distribution(TextTable& table, const std::string& name, const std::opti
 }
 
 std::string distributions(const ViewsResult& result, const TextStyle& style) {
-  TextTable table({"", "minimum", "lower quartile", "median", "upper quartile", "maximum", "geometric mean", "least in",
-                   "most in"});
+  TextTable table({"", "minimum", "lower quartile", "median", "upper quartile", "maximum", "geometric mean",
+                   "view of min", "view of max"});
   const std::vector<RunResult>& runs = result.views.front().runs;
   if (runs.front().cycles) {
     table.group("speed-up over " + name_of(runs[result.baseline].request));

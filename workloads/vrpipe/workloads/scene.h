@@ -78,6 +78,9 @@ GaussianFile open_gaussians(const std::string& scene);
 /// @throws UserError when the Gaussians lie so far out that a camera beside them rounds to where they are
 View view_of(const std::string& scene, const GaussianFile& gaussians);
 
+/// Where open_scene() puts the camera, without making a built-in scene; none for a draw list. Throws as open_scene().
+std::optional<Viewpoint> viewpoint_of(const SceneRequest& request);
+
 /// Opens a scene.
 /// Built-in: its own camera and size; view options replace what they name, the rest stays.
 /// Gaussians of a file: the camera of the file given, or the view options. What is not given comes from an automatic view: it looks
