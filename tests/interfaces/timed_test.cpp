@@ -33,15 +33,17 @@ class Sender : public Plain {
   TimedOut<int> out;
   std::vector<CycleInterval> at;     ///< of each item
   std::vector<unsigned> beats;       ///< of each item; 1 where there is none
+  std::vector<bool> joins;           ///< of each item; false where there is none
   std::vector<CycleInterval> taken;  ///< as known when it was sent
 
  private:
   Cycle tick(Cycle) override {
     while (sent_ < at.size()) {
       const CycleInterval when = at[sent_];
-      const Cycle earliest = std::max(when.first, sent_ == 0 ? 0 : out.last() + 1);
+      const bool joins_last = sent_ < joins.size() && joins[sent_];
+      const Cycle earliest = std::max(when.first, sent_ == 0 ? 0 : out.last() + (joins_last ? 0 : 1));
       taken.push_back(out.send(static_cast<int>(sent_), {earliest, earliest + (when.last - when.first)},
-                               sent_ < beats.size() ? beats[sent_] : 1));
+                               sent_ < beats.size() ? beats[sent_] : 1, joins_last));
       ++sent_;
     }
     return never;
@@ -153,6 +155,26 @@ TEST_P(TimedLink, ABatchTakesItsCyclesAndAsManyPlaces) {
   EXPECT_EQ(pair.taker->came[0].first, 12U);
   EXPECT_EQ(pair.taker->came[0].last, 16U);
   EXPECT_EQ(pair.taker->came[1].first, 17U);
+}
+
+// Of warps whose quads share a beat: the second begins in the cycle in which the first ends.
+TEST_P(TimedLink, WhatJoinsTheItemBeforeTakesNothingOfALinksRate) {
+  fresh_simulation();
+  ClockDomain clock("clock", 1000);
+  Sender sender("sender", clock);
+  Taker taker("taker", clock, 1);
+  LinkRecorder<int> recorder;
+  LinkOptions options{16, 1};
+  options.items_per_cycle = 1;
+  if (GetParam()) options.observers = {&recorder};
+  sender.out.connect(taker.in, options);
+  taker.in.open();
+  sender.at = {CycleInterval(10, 13), CycleInterval(13, 16), CycleInterval(17, 18)};
+  sender.beats = {4, 3, 2};
+  sender.joins = {false, true, false};
+  clock.run(sc_core::sc_time(1, sc_core::SC_US));
+  EXPECT_EQ(firsts(taker.came), (std::vector<Cycle>{11, 14, 18}));
+  EXPECT_EQ(taker.came[1].last, 17U);
 }
 
 TEST_P(TimedLink, ABatchLargerThanTheQueuePassesAllTheSame) {

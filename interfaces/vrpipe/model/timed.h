@@ -197,7 +197,7 @@ class TimedOut : public OutEnd<Item> {
   /// Sends an item whose parts are there in the cycles `at`, and which takes the link for so many. `joins`: its first part
   /// goes with the last one of the item before it, beside which it takes the link. Returns the cycles in which it is taken.
   CycleInterval send(const Item& item, CycleInterval at, unsigned beats = 1, bool joins = false) {
-    if (this->limited_) at = limited(at, beats);
+    if (this->limited_) at = limited(at, beats, joins);
     ++this->transferred_;
     at = direct_ != nullptr ? direct_->offer(item, at, beats, joins, this->pipeline_) : call(item, at, beats, joins);
     last_ = at.last;
@@ -236,12 +236,14 @@ class TimedOut : public OutEnd<Item> {
     this->socket->b_transport(payload, delay);
     return {payload.at, payload.last};
   }
-  /// When the link passes an item, between random stalls and at its rate.
-  [[gnu::noinline]] CycleInterval limited(CycleInterval at, unsigned beats) {
+  /// When the link passes an item, between random stalls and at its rate, of which a part that joins another item takes nothing.
+  [[gnu::noinline]] CycleInterval limited(CycleInterval at, unsigned beats, bool joins) {
     for (; this->stalled_at(at.first); ++at.first) at.last = std::max(at.last, at.first + 1);
-    if (!rate_) return at;
-    const CycleInterval passes = rate_->take(at.first, beats);
-    return {passes.first, std::max(passes.last, at.last + (passes.first - at.first))};
+    if (!rate_ || beats == 0) return at;
+    const Cycle earliest = at.first + (joins ? 1 : 0);
+    const CycleInterval passes = rate_->take(earliest, beats);
+    const Cycle later = passes.first - earliest;
+    return {joins ? at.first : passes.first, std::max(passes.last, at.last + later)};
   }
   tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>&, StreamPhase&, sc_core::sc_time&) override {
     this->fault(this->socket, "nb_transport on a link of a unit at lt");
