@@ -43,7 +43,6 @@ class TimedZrop : public TimedUnit {
         in_(*this, "in_quads", [this](const BinItem& item, CycleInterval visible) { return test(item, visible); }),
         behaviour_(std::move(behaviour)),
         time_(behaviour_->time()),
-        at_once_(std::min(time_.quads_per_cycle, QuadBeat::capacity)),
         tests_(time_.quads_per_cycle),
         late_tests_(time_.quads_per_cycle),
         updates_(time_.updates_per_cycle),
@@ -165,8 +164,6 @@ class TimedZrop : public TimedUnit {
     const bool may_change = needs_stencil && state->tests_early() && state->writes_depth_stencil();
     const bool hi_z = total > 0 && hi_z_.wanted(quads.front().draw);
     // Parts as at cycle pay for themselves. Else it is spread over the bin: a block whose quads are in two parts is paid for with both.
-    const bool parts_pay = has_cache_ && time_.z_cache.fetches_ahead();
-    const std::uint64_t price = blocks_.is_on() && !parts_pay ? blocks_.of(item.tile, quads.data(), total) : 0;
     QuadBeat beat;
     beat.tile = item.tile;
     item.quads = item.beats = 0;
@@ -184,11 +181,7 @@ class TimedZrop : public TimedUnit {
       if (has_cache_) z_.tested(beat.count, needs_stencil, at);
       const unsigned tested_quads = beat.count;
       port_free_at_ = time_.end_of_tests(at, tested_quads);
-      if (blocks_.is_on()) {
-        pay_for_blocks(parts_pay ? blocks_.of(item.tile, beat.quads.data(), tested_quads)
-                                 : price * (from + tested_quads) / total - price * from / total,
-                       tested_quads, at);
-      }
+      if (blocks_.is_on()) pay_for_blocks(beat, at);
       did(ZropWork::tests, tested_quads, at, port_free_at_);
       QuadBeat before;
       if (may_change || hi_z || tells_draws()) before = beat;
@@ -219,22 +212,23 @@ class TimedZrop : public TimedUnit {
       return has_cache_ ? looked_up : tested;
     }
     const CycleInterval taken = out_.send(item, left, item.beats);
-    charge(UnitState::busy, tested.last + 1);
+    charge(UnitState::busy, port_free_at_);
     charge(UnitState::blocked, taken.last);
     tests_.hold(taken.last);
     if (has_cache_) return looked_up;
     return {tested.first, std::max(tested.last, taken.last)};
   }
 
-  /// Of the beats in which a bin moves at cycle; all but the last are full.
-  static unsigned quads_of_beat(const BinItem& item) {
-    if (item.beats <= (item.quads + QuadBeat::capacity - 1) / QuadBeat::capacity) return QuadBeat::capacity;
-    return std::max((item.quads + item.beats - 1) / item.beats, 1U);
+  /// Of the beats in which a bin moves at cycle, all but the last: as many as any has had so far.
+  unsigned quads_of_beat(const BinItem& item) {
+    const unsigned beats = std::max(item.beats, 1U);
+    return most_of_beat_ = std::min(std::max(most_of_beat_, (item.quads + beats - 1) / beats), QuadBeat::capacity);
   }
-  /// Quads of a bin that are looked up and tested together: of one primitive and one beat where tags are looked at twice.
+  /// Quads of a bin that are looked up, paid for and tested together: of one beat, and of one primitive where tags are looked at
+  /// twice.
   unsigned end_of_part(const std::vector<Quad>& quads, unsigned from, unsigned total, unsigned of_beat) const {
-    if (!has_cache_ || !time_.z_cache.fetches_ahead()) return std::min(total, from + at_once_);
     const unsigned most = std::min(total, (from / of_beat + 1) * of_beat);
+    if (!has_cache_ || !time_.z_cache.fetches_ahead()) return most;
     unsigned end = from + 1;
     while (end < most && primitive_order(quads[end]) == primitive_order(quads[from])) ++end;
     return end;
@@ -248,10 +242,11 @@ class TimedZrop : public TimedUnit {
   void end_quads(const QuadBeat& tested, unsigned count, Cycle cycle) {
     quads_last(cycle, count, [&](unsigned i) { return tested.quads[i].draw; });
   }
-  [[gnu::noinline]] void pay_for_blocks(std::uint64_t price, unsigned quads, Cycle at) {
+  [[gnu::noinline]] void pay_for_blocks(const QuadBeat& beat, Cycle at) {
+    const std::uint64_t price = blocks_.of(beat.tile, beat.quads.data(), beat.count);
     port_free_at_ = std::max(port_free_at_, block_port_.take(at, price));
     tests_.hold(block_port_.free_from(0));
-    block_time_.test(at, quads, price);
+    block_time_.test(at, beat.count, price);
   }
 
   void pass(Mark mark, Cycle at) {
@@ -390,7 +385,7 @@ class TimedZrop : public TimedUnit {
   TimedIn<BinItem> in_;
   std::unique_ptr<ZropBehaviour> behaviour_;
   const ZropTime time_;
-  const unsigned at_once_;
+  unsigned most_of_beat_ = 1;
   BatchLimit tests_;
   IssuePort late_tests_;
   Ring<LateTest> late_;  ///< that tests have not made way to yet
