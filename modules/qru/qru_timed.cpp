@@ -18,7 +18,9 @@ class TimedQru : public TimedUnit {
            const RenderContext& context)
       : TimedUnit(name, domain, QruWork::kinds(behaviour->timing())),
         out_(*this, "out_warps"),
-        in_(*this, "in_quads", [this](const BinItem& item, CycleInterval visible) { return examine(item, visible); }),
+        in_(*this, "in_quads", std::function<void(const BinItem&, Parts&)>([this](const BinItem& item, Parts& beats) {
+          examine(item, beats);
+        })),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         numbering_(context, *behaviour_),
@@ -29,6 +31,8 @@ class TimedQru : public TimedUnit {
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
+  using Parts = TimedIn<BinItem>::Parts;
+
   void go_to(Cycle cycle) {
     if (cycle <= cycle_) return;
     if (examined_ > 0) did(QruWork::quads, std::exchange(examined_, 0), cycle_);
@@ -47,24 +51,44 @@ class TimedQru : public TimedUnit {
     go_to(taken + 1);
   }
 
-  CycleInterval examine(const BinItem& item, CycleInterval visible) {
-    go_to(std::max(visible.first, out_.last() + 1));
-    charge(UnitState::blocked, out_.last());
-    charge(UnitState::starved, cycle_);
-    const Cycle begin = cycle_;
-    left_ = cycle_;
+  void examine(const BinItem& item, Parts& beats) {
     if (item.mark != Mark::none) {
+      come(beats.visible(0));
       Warp mark;
       mark.mark = item.mark;
       numbering_.number_mark(mark);
       launch(mark);
-      return {begin, left_};
+      return beats.leave(left_);
     }
+    // All beats but the last are full; of what a test has left of a bin nobody knows in which of its beats it is.
+    const unsigned count = beats.count();
+    most_of_beat_ = std::max(most_of_beat_, (item.quads + count - 1) / count);
+    const bool are_full = (item.quads + most_of_beat_ - 1) / most_of_beat_ == count;
+    for (unsigned beat = 0, from = 0, to = 0; beat < count; ++beat, from = to) {
+      const bool is_last = beat + 1 == count;
+      to = is_last ? item.quads : are_full ? from + most_of_beat_ : item.quads * (beat + 1) / count;
+      come(beats.visible(beat));
+      examine(item, from, to);
+      while (is_last && item.last_part && behaviour_->finish_bin(warp_)) {
+        numbering_.number(warp_);
+        launch(warp_);
+      }
+      beats.leave(left_);
+    }
+    item.storage->in_use = false;
+  }
+  /// The next beat becomes visible in a cycle.
+  void come(Cycle visible) {
+    go_to(std::max(visible, out_.last() + 1));
+    charge(UnitState::blocked, out_.last());
+    charge(UnitState::starved, cycle_);
+    left_ = cycle_;
+  }
+  void examine(const BinItem& item, unsigned from, unsigned to) {
     const std::vector<Quad>& quads = item.storage->flush.quads;
-    for (unsigned from = 0; from < item.quads;) {
-      go_to(visible.of_part(from, item.quads));
+    while (from < to) {
       if (budget_ == 0) go_to(cycle_ + 1);
-      const unsigned end = from + std::min(item.quads - from, budget_);
+      const unsigned end = from + std::min(to - from, budget_);
       while (from < end) {
         bool launched = false;
         const unsigned taken = behaviour_->examine(item.tile, &quads[from], end - from, warp_, launched);
@@ -79,15 +103,6 @@ class TimedQru : public TimedUnit {
       }
     }
     charge(UnitState::busy, left_ + 1);
-    if (item.last_part) {
-      go_to(visible.last);
-      while (behaviour_->finish_bin(warp_)) {
-        numbering_.number(warp_);
-        launch(warp_);
-      }
-    }
-    item.storage->in_use = false;
-    return {begin, std::max(left_, begin)};
   }
 
   TimedOut<Warp> out_;
@@ -96,6 +111,7 @@ class TimedQru : public TimedUnit {
   const Throughput timing_;
   WarpNumbering numbering_;
   Warp warp_;
+  unsigned most_of_beat_ = 1;
   Cycle cycle_ = 0;
   Cycle left_ = 0;         ///< when the last quads were examined or the last warp was taken
   unsigned budget_;        ///< quads that can still be examined in the cycle

@@ -281,8 +281,45 @@ class TimedIn : public InEnd<Item> {
     CycleInterval (*call_)(const void*, const Item&, CycleInterval);
   };
 
+  /// The parts of an item, where its unit takes them one by one: each comes when there is a place for it, as those before it
+  /// leave.
+  class Parts {
+   public:
+    unsigned count() const { return beats_; }
+    /// When part `index` becomes visible; those before it have left.
+    Cycle visible(unsigned index) {
+      if (index == 0) {
+        taken_.first = taken_.last = std::max(at_.first, free_at());
+      } else {
+        taken_.last = std::max({taken_.last + 1, at_.of_part(index, beats_), free_at()});
+      }
+      return in_.visible(taken_.last, pipeline_).first;
+    }
+    /// The part that was asked for last leaves the queue.
+    void leave(Cycle at) {
+      in_.free_at_[in_.place_] = at + 1;
+      in_.place_ = in_.place_ + 1 == in_.depth_ ? 0 : in_.place_ + 1;
+    }
+
+   private:
+    friend class TimedIn;
+    Parts(TimedIn& in, CycleInterval at, unsigned beats, Cycle pipeline)
+        : in_(in), at_(at), beats_(beats), pipeline_(pipeline) {}
+    Cycle free_at() const { return in_.free_at_[in_.place_]; }
+    TimedIn& in_;
+    const CycleInterval at_;
+    const unsigned beats_;
+    const Cycle pipeline_;
+    CycleInterval taken_;
+  };
+
   TimedIn(TimedUnit& owner, const std::string& name, Handler handler) : InEnd<Item>(owner, name), handler_(handler) {
     TimedIn::configure(4, 1);
+  }
+  /// Of a unit that takes items by parts, all of them, one after the other.
+  TimedIn(TimedUnit& owner, const std::string& name, std::function<void(const Item&, Parts&)> take)
+      : TimedIn(owner, name, Handler([](const Item&, CycleInterval visible) { return visible; })) {
+    take_ = std::move(take);
   }
 
   void configure(unsigned depth, unsigned latency) override {
@@ -316,6 +353,7 @@ class TimedIn : public InEnd<Item> {
   }
   /// Takes an item; returns when.
   CycleInterval offer(const Item& item, CycleInterval at, unsigned beats, bool joins, Cycle pipeline) {
+    if (take_) return offer_parts(item, at, beats, pipeline);
     std::size_t place = place_;
     if (beats == 0) {
       Cycle& free_at = free_at_[place == 0 ? depth_ - 1 : place - 1];
@@ -346,6 +384,11 @@ class TimedIn : public InEnd<Item> {
     place_ = place;
     return at;
   }
+  CycleInterval offer_parts(const Item& item, CycleInterval at, unsigned beats, Cycle pipeline) {
+    Parts parts(*this, at, beats, pipeline);
+    take_(item, parts);
+    return parts.taken_;
+  }
   /// Parts that the queue has no place for at first follow when the item's own first parts have left: at best at once.
   [[gnu::noinline]] CycleInterval offer_in_rounds(const Item& item, CycleInterval at, unsigned beats, Cycle pipeline) {
     const CycleInterval offered = at;
@@ -373,6 +416,7 @@ class TimedIn : public InEnd<Item> {
   }
 
   Handler handler_;
+  std::function<void(const Item&, Parts&)> take_;  ///< instead
   TimedOut<Item>* begin_ = nullptr;
   unsigned depth_ = 4;
   unsigned latency_ = 1;
