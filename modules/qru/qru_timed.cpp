@@ -18,9 +18,8 @@ class TimedQru : public TimedUnit {
            const RenderContext& context)
       : TimedUnit(name, domain, QruWork::kinds(behaviour->timing())),
         out_(*this, "out_warps"),
-        in_(*this, "in_quads", std::function<void(const BinItem&, Parts&)>([this](const BinItem& item, Parts& beats) {
-          examine(item, beats);
-        })),
+        in_(*this, "in_quads",
+            TimedIn<BinItem>::ByParts([this](const BinItem& item, Parts& beats) { examine(item, beats); })),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         numbering_(context, *behaviour_),
@@ -60,13 +59,13 @@ class TimedQru : public TimedUnit {
       launch(mark);
       return beats.leave(left_);
     }
-    // All beats but the last are full; of what a test has left of a bin nobody knows in which of its beats it is.
     const unsigned count = beats.count();
-    most_of_beat_ = std::max(most_of_beat_, (item.quads + count - 1) / count);
-    const bool are_full = (item.quads + most_of_beat_ - 1) / most_of_beat_ == count;
+    const unsigned width = width_.of(item.quads, count);
+    // Of what a test has left of a bin nobody knows in which of its beats it is.
+    const bool are_full = (item.quads + width - 1) / width == count;
     for (unsigned beat = 0, from = 0, to = 0; beat < count; ++beat, from = to) {
       const bool is_last = beat + 1 == count;
-      to = is_last ? item.quads : are_full ? from + most_of_beat_ : item.quads * (beat + 1) / count;
+      to = is_last ? item.quads : are_full ? from + width : item.quads * (beat + 1) / count;
       come(beats.visible(beat));
       examine(item, from, to);
       while (is_last && item.last_part && behaviour_->finish_bin(warp_)) {
@@ -111,7 +110,7 @@ class TimedQru : public TimedUnit {
   const Throughput timing_;
   WarpNumbering numbering_;
   Warp warp_;
-  unsigned most_of_beat_ = 1;
+  BeatWidth width_;
   Cycle cycle_ = 0;
   Cycle left_ = 0;         ///< when the last quads were examined or the last warp was taken
   unsigned budget_;        ///< quads that can still be examined in the cycle

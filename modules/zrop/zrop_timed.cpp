@@ -152,7 +152,7 @@ class TimedZrop : public TimedUnit {
     }
     std::vector<Quad>& quads = item.storage->flush.quads;
     const unsigned total = item.quads;
-    const unsigned of_beat = quads_of_beat(item);
+    const unsigned of_beat = width_.of(item.quads, item.beats);
     const unsigned parts = count_parts(quads, total, of_beat);
     CycleInterval tested(never, 0);
     CycleInterval left(never, 0);
@@ -163,7 +163,6 @@ class TimedZrop : public TimedUnit {
     const bool needs_stencil = has_cache_ && state != nullptr && state->reads_depth_stencil_early();
     const bool may_change = needs_stencil && state->tests_early() && state->writes_depth_stencil();
     const bool hi_z = total > 0 && hi_z_.wanted(quads.front().draw);
-    // Parts as at cycle pay for themselves. Else it is spread over the bin: a block whose quads are in two parts is paid for with both.
     QuadBeat beat;
     beat.tile = item.tile;
     item.quads = item.beats = 0;
@@ -219,11 +218,6 @@ class TimedZrop : public TimedUnit {
     return {tested.first, std::max(tested.last, taken.last)};
   }
 
-  /// Of the beats in which a bin moves at cycle, all but the last: as many as any has had so far.
-  unsigned quads_of_beat(const BinItem& item) {
-    const unsigned beats = std::max(item.beats, 1U);
-    return most_of_beat_ = std::min(std::max(most_of_beat_, (item.quads + beats - 1) / beats), QuadBeat::capacity);
-  }
   /// Quads of a bin that are looked up, paid for and tested together: of one beat, and of one primitive where tags are looked at
   /// twice.
   unsigned end_of_part(const std::vector<Quad>& quads, unsigned from, unsigned total, unsigned of_beat) const {
@@ -385,7 +379,7 @@ class TimedZrop : public TimedUnit {
   TimedIn<BinItem> in_;
   std::unique_ptr<ZropBehaviour> behaviour_;
   const ZropTime time_;
-  unsigned most_of_beat_ = 1;
+  BeatWidth width_;  ///< of bins
   BatchLimit tests_;
   IssuePort late_tests_;
   Ring<LateTest> late_;  ///< that tests have not made way to yet

@@ -317,7 +317,8 @@ class TimedIn : public InEnd<Item> {
     TimedIn::configure(4, 1);
   }
   /// Of a unit that takes items by parts, all of them, one after the other.
-  TimedIn(TimedUnit& owner, const std::string& name, std::function<void(const Item&, Parts&)> take)
+  using ByParts = std::function<void(const Item&, Parts&)>;
+  TimedIn(TimedUnit& owner, const std::string& name, ByParts take)
       : TimedIn(owner, name, Handler([](const Item&, CycleInterval visible) { return visible; })) {
     take_ = std::move(take);
   }
@@ -416,7 +417,7 @@ class TimedIn : public InEnd<Item> {
   }
 
   Handler handler_;
-  std::function<void(const Item&, Parts&)> take_;  ///< instead
+  ByParts take_;  ///< instead
   TimedOut<Item>* begin_ = nullptr;
   unsigned depth_ = 4;
   unsigned latency_ = 1;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include <vrpipe/pipeline/payload.h>
@@ -20,6 +21,19 @@ struct BinItem {
   std::uint32_t beats = 1;  ///< of quads, as it moves at cycle
   Mark mark = Mark::none;
   bool last_part = true;  ///< closes the bin; what runs ahead of time has a bin in parts
+};
+
+/// Quads of the beats in which bins move at cycle, all but the last: as many as any is known to have had so far.
+class BeatWidth {
+ public:
+  /// Of a bin of so many quads and beats.
+  unsigned of(std::uint32_t quads, std::uint32_t beats) {
+    beats = std::max(beats, 1U);
+    return most_ = std::min(std::max(most_, (quads + beats - 1) / beats), QuadBeat::capacity);
+  }
+
+ private:
+  unsigned most_ = 1;
 };
 
 }  // namespace vrpipe
