@@ -166,8 +166,8 @@ void ConfigFile::read(Arguments& arguments, const std::vector<std::string>& othe
     } else {
       const std::string& type = option->value_name;
       const toml::array* const list = node->as_array();
-      const auto add_value = [&](const toml::node& value, unsigned at) {
-        const std::string text = reader.value(value, key, *option);
+      const auto add_value = [&, &name = key](const toml::node& value, unsigned at) {
+        const std::string text = reader.value(value, name, *option);
         add(option->name, is_merged(option->name) ? text : "", text, at);
         if (names_file(*option)) mention_file(entries_.back().what(), text, at);
       };
