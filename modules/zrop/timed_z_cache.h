@@ -66,7 +66,7 @@ class TimedZCache {
   Cycle turn(unsigned quads, unsigned begun, Cycle visible) {
     if (!timing_.fetches_ahead()) return early_.turn(quads, visible);
     const Cycle at = lines_ahead_.free_from(visible, 1);
-    if (begun > 0) return early_.take(begun, at);
+    if (begun > 0) return early_.look_ups.take(begun, at);
     early_.look_ups.hold(at);
     return early_.look_ups.now();
   }
@@ -155,12 +155,7 @@ class TimedZCache {
   /// From the look-up of quads to their test, in order.
   struct Way {
     Way(unsigned quads_per_cycle, unsigned places) : look_ups(quads_per_cycle), queue(places) {}
-    Cycle take(unsigned quads, Cycle at) {
-      at = look_ups.free_from(quads, at);
-      look_ups.take(quads);
-      return at;
-    }
-    Cycle turn(unsigned quads, Cycle visible) { return take(quads, queue.free_from(visible, quads)); }
+    Cycle turn(unsigned quads, Cycle visible) { return look_ups.take(quads, queue.free_from(visible, quads)); }
     BatchLimit look_ups;
     SlotPool queue;  ///< quads between look-up and test
     Cycle read = 0;  ///< the last line looked up for a test

@@ -139,8 +139,7 @@ class TimedZrop : public TimedUnit {
     tests_.hold(out_.last());
     charge(UnitState::blocked, out_.last());
     if (item.mark != Mark::none) {
-      const Cycle at = tests_.free_from(1, visible.first);
-      tests_.take(1);
+      const Cycle at = tests_.take(1, visible.first);
       if (plan_.waits_at(item.mark)) return send_around(item, at);
       if (has_cache_) look_up_updates(at);
       pass(item.mark, at);
@@ -298,8 +297,7 @@ class TimedZrop : public TimedUnit {
   [[gnu::noinline]] void make_way(Cycle test) {
     for (; !late_.empty() && late_.front().at <= std::max(test, tests_.next_free()); late_.pop()) {
       const unsigned quads = late_.front().quads;
-      const Cycle at = tests_.free_from(quads, late_.front().at);
-      tests_.take(quads);
+      const Cycle at = tests_.take(quads, late_.front().at);
       const Cycle until = time_.end_of_tests(at, quads);
       did(ZropWork::late_tests, quads, at, until);
       if (blocks_.is_on()) block_time_.test(at, quads, 0);

@@ -50,11 +50,13 @@ TEST_P(UnitAtCycle, TakesNearlyTheTimeOfCycle) {
       const RunResult lt = run(at_cycle(request, {}), draw);
       const RunResult mixed = run(at_cycle(request, units()), draw);
       const double least = std::fabs(percent_above(*lt.cycles, *cycle.cycles));
-      // Vertices come out of SMs at cycle later in the order of calls than at lt, and bins of TC time out meanwhile.
-      const double usual = GetParam() == "sm" ? 6.5 : 2.5;
-      EXPECT_NEAR(percent_above(*mixed.cycles, *cycle.cycles), 0, std::max(usual, least + 1))
+      // Vertices come out of SMs at cycle later in the order of calls than at lt, and bins of a TC that times them out go
+      // meanwhile (docs/accuracy.md).
+      const bool times_out = GetParam() == "sm" && platform == std::string("gh100-gpc");
+      EXPECT_NEAR(percent_above(*mixed.cycles, *cycle.cycles), 0, std::max(times_out ? 6.5 : 2.5, least + 1))
           << platform << " " << variant.name;
-      EXPECT_NEAR(percent_above(mixed.counts.quads_blended, cycle.counts.quads_blended), 0, usual) << variant.name;
+      EXPECT_NEAR(percent_above(mixed.counts.quads_blended, cycle.counts.quads_blended), 0, times_out ? 6.5 : 2)
+          << platform << " " << variant.name;
       if (variant.early_termination || variant.quad_merging) continue;
       EXPECT_EQ(mixed.counts.fragments_blended, cycle.counts.fragments_blended) << platform;
       EXPECT_TRUE(same_image(mixed.framebuffer.color, cycle.framebuffer.color)) << platform;

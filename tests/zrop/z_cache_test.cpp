@@ -508,6 +508,24 @@ TEST_F(ZCacheTest, WhatMakesNoCacheIsRefusedWhenTheUnitIsMade) {
   EXPECT_THROW(ZCache(parameters, DepthFormat::d32f), UserError) << "of half a quad";
 }
 
+/// As ZBench, at lt.
+struct TimedZBench {
+  explicit TimedZBench(const RenderContext& context, const Bench::Settings& settings = {}, unsigned update_depth = 4,
+                       unsigned update_latency = 1)
+      : bench(Fidelity::lt, "zrop", "depth-stencil-rop", context, ZBench::with_defaults(settings)),
+        memory("noting_memory", bench.clock(), 100),
+        in(bench.source<BinItem>("in_quads", 64)),
+        updates(bench.source<TerminationBeat>("in_terminations", update_depth, update_latency)),
+        out(bench.sink<BinItem>("out_quads", 64)) {
+    bench.bind_memory(memory.socket);
+  }
+  Bench bench;
+  NotingMemory memory;
+  Source<BinItem>& in;
+  Source<TerminationBeat>& updates;
+  Sink<BinItem>& out;
+};
+
 /// At lt a bin waits for its fills as its beats do at cycle.
 class TimedZCacheTest : public ::testing::Test {
  protected:
@@ -520,116 +538,81 @@ class TimedZCacheTest : public ::testing::Test {
 };
 
 TEST_F(TimedZCacheTest, AMissWaitsForItsFillAndAHitDoesNot) {
-  Bench bench(Fidelity::lt, "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"fast_clear", "off"}});
-  NotingMemory memory("noting_memory", bench.clock(), 100);
-  bench.bind_memory(memory.socket);
-  Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
-  Sink<BinItem>& out = bench.sink<BinItem>("out_quads", 64);
-  in.add(bins.at({0, 0}, {0, 1}), 10);
-  in.add(bins.at({0, 0}, {4}, 2), 20);
-  in.add(bins.at({0, 0}, {0}, 3), 150);
-  bench.run();
-  EXPECT_EQ(testing::cycles_of(out), (std::vector<Cycle>{112, 122, 152}));
-  EXPECT_EQ(memory.accesses.size(), 2U);
+  TimedZBench zrop(context);
+  zrop.in.add(bins.at({0, 0}, {0, 1}), 10);
+  zrop.in.add(bins.at({0, 0}, {4}, 2), 20);
+  zrop.in.add(bins.at({0, 0}, {0}, 3), 150);
+  zrop.bench.run();
+  EXPECT_EQ(testing::cycles_of(zrop.out), (std::vector<Cycle>{112, 122, 152}));
+  EXPECT_EQ(zrop.memory.accesses.size(), 2U);
 }
 
 TEST_F(TimedZCacheTest, AFastClearSparesReadingWhatNothingWasWrittenBackTo) {
-  Bench bench(Fidelity::lt, "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"cache_bytes", "128"}});
-  NotingMemory memory("noting_memory", bench.clock(), 100);
-  bench.bind_memory(memory.socket);
-  Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
-  Source<TerminationBeat>& updates = bench.source<TerminationBeat>("in_terminations");
-  Sink<BinItem>& out = bench.sink<BinItem>("out_quads", 64);
-  in.add(bins.at({0, 0}, {0, 8}), 10);
-  updates.add(signals({0}), 20);
-  in.add(bins.at({0, 0}, {4}, 1), 130);
-  in.add(bins.at({0, 0}, {8}, 2), 240);
-  in.add(bins.at({0, 0}, {1}, 3), 350);
-  bench.run();
-  EXPECT_EQ(testing::cycles_of(out), (std::vector<Cycle>{12, 132, 242, 452}))
+  TimedZBench zrop(context, {{"fast_clear", "on"}, {"cache_bytes", "128"}});
+  zrop.in.add(bins.at({0, 0}, {0, 8}), 10);
+  zrop.updates.add(signals({0}), 20);
+  zrop.in.add(bins.at({0, 0}, {4}, 1), 130);
+  zrop.in.add(bins.at({0, 0}, {8}, 2), 240);
+  zrop.in.add(bins.at({0, 0}, {1}, 3), 350);
+  zrop.bench.run();
+  EXPECT_EQ(testing::cycles_of(zrop.out), (std::vector<Cycle>{12, 132, 242, 452}))
       << "the last one's sector was written back";
-  EXPECT_EQ(memory.bytes(false), 32U);
-  EXPECT_EQ(memory.bytes(true), 32U);
+  EXPECT_EQ(zrop.memory.bytes(false), 32U);
+  EXPECT_EQ(zrop.memory.bytes(true), 32U);
 }
 
 TEST_F(TimedZCacheTest, AnUpdateWaitsForItsFillAndTestsGoBy) {
-  Bench bench(Fidelity::lt, "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"fast_clear", "off"}});
-  NotingMemory memory("noting_memory", bench.clock(), 100);
-  bench.bind_memory(memory.socket);
-  Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
-  Source<TerminationBeat>& updates = bench.source<TerminationBeat>("in_terminations");
-  Sink<BinItem>& out = bench.sink<BinItem>("out_quads", 64);
-  in.add(bins.at({0, 0}, {0}), 10);
-  updates.add(signals({4}), 200);
-  in.add(bins.at({0, 0}, {0}, 1), 250);
-  in.add(bins.at({0, 0}, {5}, 2), 400);
-  in.add(bins.at({0, 0}, {4}, 3), 500);
-  bench.run();
-  const auto& rop = bench.behaviour<DepthStencilRop>();
-  EXPECT_EQ(testing::cycles_of(out), (std::vector<Cycle>{112, 252, 402, 502}));
+  TimedZBench zrop(context);
+  zrop.in.add(bins.at({0, 0}, {0}), 10);
+  zrop.updates.add(signals({4}), 200);
+  zrop.in.add(bins.at({0, 0}, {0}, 1), 250);
+  zrop.in.add(bins.at({0, 0}, {5}, 2), 400);
+  zrop.in.add(bins.at({0, 0}, {4}, 3), 500);
+  zrop.bench.run();
+  const auto& rop = zrop.bench.behaviour<DepthStencilRop>();
+  EXPECT_EQ(testing::cycles_of(zrop.out), (std::vector<Cycle>{112, 252, 402, 502}));
   EXPECT_EQ(rop.quads_terminated.value(), 1U);
-  EXPECT_EQ(memory.accesses.size(), 2U) << "the sector of the update is that of the last tests";
+  EXPECT_EQ(zrop.memory.accesses.size(), 2U) << "the sector of the update is that of the last tests";
 }
 
 TEST_F(TimedZCacheTest, ATestSeesAnUpdateThatCameBehindItsLookUp) {
   for (const bool in_time : {true, false}) {
-    Bench bench(Fidelity::lt, "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"fast_clear", "off"}});
-    NotingMemory memory("noting_memory", bench.clock(), 100);
-    bench.bind_memory(memory.socket);
-    Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
-    Source<TerminationBeat>& updates = bench.source<TerminationBeat>("in_terminations", 4, 60);
-    bench.sink<BinItem>("out_quads", 64);
-    updates.add(signals({0}), in_time ? 10 : 70);  // visible in 70 or 130
-    in.add(bins.at({0, 0}, {0}), 20);              // looked up in 21, tested in 121
-    bench.run();
-    EXPECT_EQ(bench.behaviour<DepthStencilRop>().quads_terminated.value(), in_time ? 1U : 0U);
-    EXPECT_EQ(memory.accesses.size(), 1U) << "the sector is fetched once";
+    TimedZBench zrop(context, {}, 4, 60);
+    zrop.updates.add(signals({0}), in_time ? 10 : 70);  // visible in 70 or 130
+    zrop.in.add(bins.at({0, 0}, {0}), 20);              // looked up in 21, tested in 121
+    zrop.bench.run();
+    EXPECT_EQ(zrop.bench.behaviour<DepthStencilRop>().quads_terminated.value(), in_time ? 1U : 0U);
+    EXPECT_EQ(zrop.memory.accesses.size(), 1U) << "the sector is fetched once";
   }
 }
 
 TEST_F(TimedZCacheTest, ATestThatHasComeWaitsForAllUpdatesThatFollowOneAnother) {
   for (const unsigned updates : {1U, 5U}) {
-    Bench bench(Fidelity::lt, "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"fast_clear", "off"}});
-    NotingMemory memory("noting_memory", bench.clock(), 100);
-    bench.bind_memory(memory.socket);
-    Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
-    Source<TerminationBeat>& terminations = bench.source<TerminationBeat>("in_terminations", 8, 110);
-    Sink<BinItem>& out = bench.sink<BinItem>("out_quads", 64);
+    TimedZBench zrop(context, {}, 8, 110);
     // Of the sector that the test waits for, one a cycle from 121 on.
-    for (unsigned i = 0; i < updates; ++i) terminations.add(signals({1}), 11 + i);
-    in.add(bins.at({0, 0}, {0}), 20);  // looked up in 21, there in 121
-    bench.run();
-    EXPECT_EQ(testing::cycles_of(out), (std::vector<Cycle>{122 + updates}));
+    for (unsigned i = 0; i < updates; ++i) zrop.updates.add(signals({1}), 11 + i);
+    zrop.in.add(bins.at({0, 0}, {0}), 20);  // looked up in 21, there in 121
+    zrop.bench.run();
+    EXPECT_EQ(testing::cycles_of(zrop.out), (std::vector<Cycle>{122 + updates}));
   }
 }
 
 TEST_F(TimedZCacheTest, UpdatesThatWaitForTheirFillsTakeOneCycleEach) {
-  Bench bench(Fidelity::lt, "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"fast_clear", "off"}});
-  NotingMemory memory("noting_memory", bench.clock(), 100);
-  bench.bind_memory(memory.socket);
-  Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
-  Source<TerminationBeat>& terminations = bench.source<TerminationBeat>("in_terminations", 4, 90);
-  Sink<BinItem>& out = bench.sink<BinItem>("out_quads", 64);
-  terminations.add(signals({0, 1, 0, 1}), 11);  // looked up from 101 on, by the fill of the test there in 121
-  in.add(bins.at({0, 0}, {0}), 20);
-  bench.run();
-  EXPECT_EQ(testing::cycles_of(out), (std::vector<Cycle>{126}));
+  TimedZBench zrop(context, {}, 4, 90);
+  zrop.updates.add(signals({0, 1, 0, 1}), 11);  // looked up from 101 on, by the fill of the test there in 121
+  zrop.in.add(bins.at({0, 0}, {0}), 20);
+  zrop.bench.run();
+  EXPECT_EQ(testing::cycles_of(zrop.out), (std::vector<Cycle>{126}));
 }
 
 TEST_F(TimedZCacheTest, AFullQueueOfUpdatesHoldsTheLink) {
   for (const unsigned places : {1U, 2U}) {
-    Bench bench(Fidelity::lt, "zrop", "depth-stencil-rop", context,
-                {{"latency_cycles", "1"}, {"fast_clear", "off"}, {"input_updates", std::to_string(places)}});
-    NotingMemory memory("noting_memory", bench.clock(), 100);
-    bench.bind_memory(memory.socket);
-    Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
-    Source<TerminationBeat>& updates = bench.source<TerminationBeat>("in_terminations", 1);
-    bench.sink<BinItem>("out_quads", 64);
-    in.add(bins.at({0, 0}, {16}), 10);  // by which it is known how long a fill takes
-    for (const unsigned position : {0U, 4U, 32U}) updates.add(signals({position}), 200);
-    bench.run();
+    TimedZBench zrop(context, {{"input_updates", std::to_string(places)}}, 1);
+    zrop.in.add(bins.at({0, 0}, {16}), 10);  // by which it is known how long a fill takes
+    for (const unsigned position : {0U, 4U, 32U}) zrop.updates.add(signals({position}), 200);
+    zrop.bench.run();
     // The first is in the queue from 201 to 301.
-    EXPECT_EQ(updates.sent().at(2), places == 2 ? 204U : 303U) << places;
+    EXPECT_EQ(zrop.updates.sent().at(2), places == 2 ? 204U : 303U) << places;
   }
 }
 

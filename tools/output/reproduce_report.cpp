@@ -32,7 +32,7 @@ std::string row_text(const Reproduction& of, const RowFinding& finding, const Te
                                  row.says);
   const std::string measured = finding.measured.empty() ? "-" : finding.measured;
   const std::string difference = difference_text(finding);
-  constexpr std::size_t before = 4 + 20 + 24;  // as row_form has it
+  const std::size_t before = fmt::formatted_size(row_form, "", "", "");
   const bool is_short = measured.size() + 2 + difference.size() <= table_width - before;
   text += (is_short ? measured + (difference.empty() ? "" : ", " + difference) : difference) + "\n";
   constexpr std::size_t indent = 4;

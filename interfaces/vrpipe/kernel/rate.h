@@ -78,6 +78,12 @@ class BatchLimit {
     for (at = std::max(at, cycle_); !allows(items, at);) at = next(at);
     return at;
   }
+  /// It goes then; returns the cycle.
+  Cycle take(std::uint32_t items, Cycle earliest) {
+    const Cycle at = free_from(items, earliest);
+    take(items);
+    return at;
+  }
   /// Nothing goes before this cycle any more.
   void hold(Cycle cycle) {
     if (cycle > cycle_) allows(1, cycle);
