@@ -40,7 +40,7 @@ TEST(Interval, ADeterminantOfDifferencesIsUndecidedWhereTheFactorFormIsCertain) 
 // case O10
 TEST(Interval, WithPaddingEverySampleThatIsCertainlyVisibleIsBlended) {
   constexpr std::uint64_t seed = 10;
-  for (unsigned i = 0; i < 200; ++i) {
+  for (unsigned i = 0; i < 100; ++i) {
     const Splat splat = splat_at(uniform(seed, 8 * i, 4, 60), uniform(seed, 8 * i + 1, 4, 60),
                                  uniform(seed, 8 * i + 2, 0.55F, 9), uniform(seed, 8 * i + 3, 0.55F, 4),
                                  uniform(seed, 8 * i + 4, 0, 6), uniform(seed, 8 * i + 5, 0.005F, 1));

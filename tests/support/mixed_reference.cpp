@@ -100,6 +100,15 @@ class Renderer {
       if (clear.stencil) out_.stencil[i] = clear.stencil_value;
     }
   }
+  /// The first pixel that may have a sample between three coordinates, and the one after the last.
+  template <class Coordinates>
+  std::pair<std::uint32_t, std::uint32_t> pixels_between(const Coordinates& of, std::uint32_t size) const {
+    const auto pixel = [&](std::int64_t at) {
+      return static_cast<std::uint32_t>(std::clamp<std::int64_t>(at >> context_.precision.subpixel_bits, 0, size));
+    };
+    return {pixel(std::min({of[0], of[1], of[2]})),
+            pixel(std::int64_t{std::max({of[0], of[1], of[2]})} + (1 << context_.precision.subpixel_bits))};
+  }
   void draw(DrawIndex index) {
     const DrawCall& call = frame_.draw_call(index);
     for (std::uint32_t i = 0; i < call.splats; ++i) {
@@ -116,8 +125,10 @@ class Renderer {
         const bool is_back = is_mesh && cross > 0;
         if (is_mesh && call.state.cull == CullMode::back && is_back) continue;
         if (is_mesh && call.state.cull == CullMode::front && !is_back) continue;
-        for (std::uint32_t y = 0; y < out_.height; ++y) {
-          for (std::uint32_t x = 0; x < out_.width; ++x) {
+        const auto [left, right] = pixels_between(snapped.x, out_.width);
+        const auto [top, bottom] = pixels_between(snapped.y, out_.height);
+        for (std::uint32_t y = top; y < bottom; ++y) {
+          for (std::uint32_t x = left; x < right; ++x) {
             if (covers(snapped, context_.precision.subpixel_bits, x, y)) sample(index, splat, snapped, is_back, x, y);
           }
         }

@@ -435,7 +435,7 @@ class Reproduce : public ToolTest {
  protected:
   void SetUp() override {
     GaussianSceneBuilder builder(0);
-    for (int i = 0; i < 300; ++i) {
+    for (int i = 0; i < 120; ++i) {
       GaussianAttributes gaussian;
       const auto spread = [i](int step) { return 0.04F * static_cast<float>((i * step) % 23 - 11); };
       gaussian.position = {spread(7), spread(5), spread(3)};
