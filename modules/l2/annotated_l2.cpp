@@ -143,6 +143,9 @@ AnnotatedL2::Wait AnnotatedL2::fetch(const MemoryRequest& access, const LineAcce
                              const Cycle there = access_below(read, asks);
                              std::fill_n(fills + run.first, run.count, Fill{asks, there});
                              counted_fills_.ask(run.count, asks, there);
+                             ++reads_;
+                             read_cycles_ += there - asks;
+                             quickest_read_ = std::min(quickest_read_, std::max<Cycle>(there - asks, 1));
                              last_there = std::max(last_there, there);
                              wait.moved += read.bytes;
                            });

@@ -32,6 +32,9 @@ class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private 
   MemoryBytes memory_bytes() const override { return memory_.moved(); }
   MemoryBehaviour& behaviour() override { return *behaviour_; }
   const StatisticSet& statistics() const override { return statistics_; }
+  double waiting_of_reads() const override {
+    return reads_ == 0 ? 1 : static_cast<double>(read_cycles_) / static_cast<double>(reads_ * quickest_read_);
+  }
   std::vector<OccupancyPart> parts(Cycle end) const override;
 
  private:
@@ -89,6 +92,8 @@ class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private 
   std::vector<Fill> fills_;  ///< by line of the cache and sector
   AnnotatedFillCounter counted_fills_;
   Cycle quickest_write_ = never;  ///< below, in cycles: what takes longer waits for its turn
+  Cycle quickest_read_ = never;
+  std::uint64_t reads_ = 0, read_cycles_ = 0;
   StatisticSet statistics_;
 };
 

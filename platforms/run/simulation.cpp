@@ -42,6 +42,13 @@ const char* name_of(Fidelity fidelity) {
   return "";
 }
 
+/// At lt. A draw takes at least as long as its busiest resource works, which lt knows; where that never rests, no order of events
+/// matters. What was measured of the rest: benchmarks/lt_errors.
+double expected_error_percent(double occupancy) {
+  const double undecided = 1 - occupancy;
+  return 0.2 + 2 * undecided / (undecided + 0.1);
+}
+
 namespace {
 constexpr const char* sampled_name = "sampled";
 }  // namespace
@@ -437,6 +444,17 @@ void set_time(const Configuration& configuration, Cycle cycles, RunResult& resul
   result.milliseconds = static_cast<double>(cycles) / (configuration.platform().frequency_mhz * 1e3);
 }
 
+/// At lt, of what was measured: benchmarks/lt_errors. A memory that is the bottleneck, or whose reads wait for one another, gets its
+/// requests in the order of calls, and answers later ones as if those before were all.
+std::optional<double> expected_error_of(const Gpu& gpu, const RunResult& result) {
+  if (!result.bottleneck || !result.outside_validated_range.empty()) return std::nullopt;
+  constexpr double waits = 8;  // times as long as the quickest read
+  const bool is_ordered_by_memory = std::any_of(gpu.memories().begin(), gpu.memories().end(), [&](const auto& placed) {
+    return placed.memory->waiting_of_reads() > waits || placed.instance->path == result.bottleneck->unit;
+  });
+  return is_ordered_by_memory ? 10 : expected_error_percent(result.bottleneck->occupancy);
+}
+
 void run_clocked(const Configuration& configuration, std::atomic<float>* progress, RunResult& result) {
   Gpu gpu(configuration, result.framebuffer);
   StatisticSampler sampler;
@@ -472,6 +490,8 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
     occupancy.add_memory(std::move(report), placed.instance->slot, placed.memory->parts(cycles));
   }
   occupancy.finish();
+  result.expected_error_percent =
+      configuration.request().fidelity == Fidelity::cycle ? 0 : expected_error_of(gpu, result);
   if (!result.stopped) check_conservation(gpu, configuration.netlist());
   report_counts(configuration, behaviours, statistics, result);
   if (!result.stopped) set_draw_times(gpu.clock().frame_end().of_draws(), cycles, result.draws);
@@ -575,13 +595,6 @@ void run_untimed(const Configuration& configuration, std::atomic<float>* progres
 
 }  // namespace
 
-/// At lt. A draw takes at least as long as its busiest resource works, which lt knows; where that never rests, no order of events
-/// matters. What was measured of the rest: benchmarks/lt_errors.
-double expected_error_percent(double occupancy) {
-  const double undecided = 1 - occupancy;
-  return 0.2 + 2 * undecided / (undecided + 0.1);
-}
-
 RunResult simulate_pipeline(const RunRequest& request, const Frame& frame, std::atomic<float>* progress,
                             FrameSampler* sampler) {
   check_sampling_has_time(request);
@@ -600,9 +613,6 @@ RunResult simulate_pipeline(const RunRequest& request, const Frame& frame, std::
   }
   if (has_time(request.fidelity)) {
     run_clocked(configuration, progress, result);
-    if (request.fidelity == Fidelity::cycle) result.expected_error_percent = 0;
-    if (request.fidelity == Fidelity::lt && result.bottleneck && result.outside_validated_range.empty())
-      result.expected_error_percent = expected_error_percent(result.bottleneck->occupancy);
   } else {
     run_untimed(configuration, progress, result, sampler);
   }

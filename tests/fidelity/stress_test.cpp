@@ -119,6 +119,22 @@ TEST(ExpectedError, IsSmallWhereTheBottleneckNeverRests) {
   EXPECT_GT(*waiting.expected_error_percent, 1.5);
 }
 
+/// lt answers a read of memory before it knows of those that are asked for later and come first.
+TEST(ExpectedError, IsLargeWhereRequestsWaitForOneAnotherInMemory) {
+  const Draw draw = random_draw(160, 120, 2000, 6);
+  const auto at_lt = [&](std::vector<Setting> settings) {
+    return run(on("agx-orin",
+                  request_of("baseline", Fidelity::lt, [&](RunRequest& r) { r.settings = std::move(settings); })),
+               draw);
+  };
+  EXPECT_LT(*at_lt({}).expected_error_percent, 3);
+  EXPECT_EQ(at_lt({{"dram", "channels", "1"}, {"dram", "tccd_l_ps", "100000"}}).expected_error_percent, 10)
+      << "for long";
+  const RunResult slow = at_lt({{"l2", "frequency_mhz", "1"}});
+  EXPECT_EQ(slow.bottleneck->unit, "l2");
+  EXPECT_EQ(slow.expected_error_percent, 10);
+}
+
 /// A unit's slots are full, and the next core has none either: all warps of a tile to one core.
 TEST(Stress, FewTilesOnOneCoreWaitForTheSlotsOfThatCore) {
   const Draw draw = random_draw(17, 33, 200, 3);

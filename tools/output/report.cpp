@@ -385,7 +385,7 @@ std::string expected_error_text(const std::vector<RunResult>& runs) {
         fmt::format("{}+-{:.1f} %", runs.size() > 1 ? name_of(run.request) + " " : "", *run.expected_error_percent));
   }
   if (parts.empty()) return {};
-  return fmt::format("{}: cycles within {}, as nine of ten runs whose bottleneck is as busy\n",
+  return fmt::format("{}: cycles within {}, as nine of ten runs whose bottleneck and memory are as busy\n",
                      fidelity_of(runs.front().request), fmt::join(parts, ", "));
 }
 

@@ -305,8 +305,9 @@ struct RunResult {
   std::vector<std::pair<std::string, std::string>> parameters;
   /// Reasons why cycles of lt, or a bound, may be farther off than documented; empty at the other fidelities.
   std::vector<std::string> outside_validated_range;
-  /// How far the cycles may be off those of `cycle`, percent: of runs whose bottleneck was as busy, over random configurations of
-  /// all platforms, nine of ten were within. 0 where they are exact; none where that is not known, as outside of what was validated.
+  /// How far the cycles may be off those of `cycle`, percent: of runs whose bottleneck and memory were as busy, over random
+  /// configurations of all platforms, nine of ten were within. 0 where they are exact; none where that is not known, as outside of
+  /// what was validated.
   std::optional<double> expected_error_percent;
   /// All that the platform's components declare, by name, and what became of each in this run.
   std::vector<EffectReport> effects;
