@@ -22,7 +22,6 @@ namespace vrpipe {
 namespace {
 
 constexpr char kCannotUseOption[] = "cannot use option";
-const std::string kBuiltinPrefix = "builtin:";
 
 /// The view with what the user named in place of what was there.
 View with_options(View view, const SceneRequest& request) {
@@ -205,26 +204,24 @@ SceneRequest of_file(SceneRequest request, const SceneSubstitution& in_place) {
   return request;
 }
 
-bool is_builtin(const std::string& scene) { return scene.rfind(kBuiltinPrefix, 0) == 0 && !scene_substitution(scene); }
-
 }  // namespace
 
 std::string scene_name(const std::string& scene) {
-  if (scene.empty()) return kBuiltinPrefix + kDefaultBuiltinScene;
+  if (scene.empty()) return builtin_prefix + kDefaultBuiltinScene;
   if (const auto in_place = scene_substitution(scene)) return in_place->name + "=" + scene_name(in_place->file);
-  if (is_builtin(scene)) return scene;
+  if (builtin_name_of(scene)) return scene;
   const std::filesystem::path path(scene);
   return (path.has_filename() ? path : path.parent_path()).filename().string();
 }
 
-bool is_draw_list(const std::string& scene) { return !is_builtin(scene) && extension_of(scene) == ".spl"; }
+bool is_draw_list(const std::string& scene) { return !builtin_name_of(scene) && extension_of(scene) == ".spl"; }
 
 GaussianFile open_gaussians(const std::string& scene) {
   if (const auto in_place = scene_substitution(scene)) return open_gaussians(in_place->file);
   const std::string name = scene_name(scene);
-  if (is_builtin(name)) {
+  if (const auto builtin = builtin_name_of(name)) {
     GaussianFile file;
-    file.gaussians = cached_builtin_scene(name.substr(kBuiltinPrefix.size())).gaussians;
+    file.gaussians = cached_builtin_scene(*builtin).gaussians;
     file.format = "built-in";
     return file;
   }
@@ -238,27 +235,23 @@ GaussianFile open_gaussians(const std::string& scene) {
   if (!path.has_extension() && !std::filesystem::exists(path, ignored)) {
     throw UserError("cannot read scene", scene, "no such file",
                     "check the path, or take a built-in scene: " +
-                        suggestion(scene, builtin_scene_names(), "", kBuiltinPrefix));
+                        suggestion(scene, builtin_scene_names(), "", builtin_prefix));
   }
   refuse_mesh(path.string());
   return read_gaussian_file(scene);
 }
 
 View view_of(const std::string& scene, const GaussianFile& gaussians) {
-  const std::string name = scene_name(scene);
-  if (!is_builtin(name)) return automatic_view(scene, gaussians, {});
-  const auto& infos = builtin_scenes();
-  const auto info = std::find_if(infos.begin(), infos.end(),
-                                 [&](const BuiltinSceneInfo& each) { return kBuiltinPrefix + each.name == name; });
-  return info->view;
+  const auto builtin = builtin_name_of(scene_name(scene));
+  return builtin ? builtin_scene_named(*builtin).view : automatic_view(scene, gaussians, {});
 }
 
 std::optional<Viewpoint> viewpoint_of(const SceneRequest& request) {
   if (const auto in_place = scene_substitution(request.scene)) return viewpoint_of(of_file(request, *in_place));
   if (is_draw_list(request.scene)) return std::nullopt;
   check_view_options(request);
-  const std::string name = scene_name(request.scene);
-  if (is_builtin(name)) return viewpoint_in(builtin_scene_named(name.substr(kBuiltinPrefix.size())), request);
+  if (const auto builtin = builtin_name_of(scene_name(request.scene)))
+    return viewpoint_in(builtin_scene_named(*builtin), request);
   return viewpoint_in(open_gaussians(request.scene), request);
 }
 
@@ -271,9 +264,9 @@ OpenedScene open_scene(const SceneRequest& request) {
   if (request.size) check_image_size(request.size->width, request.size->height, "--size");
   OpenedScene scene;
   scene.name = scene_name(request.scene);
-  if (is_builtin(scene.name)) {
+  if (const auto builtin = builtin_name_of(scene.name)) {
     check_view_options(request);
-    open_builtin(scene.name.substr(kBuiltinPrefix.size()), request, scene);
+    open_builtin(*builtin, request, scene);
     read_meshes(request, scene);
     return scene;
   }

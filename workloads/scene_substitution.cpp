@@ -6,8 +6,6 @@
 namespace vrpipe {
 namespace {
 
-const std::string kPrefix = "builtin:";
-
 bool begins(const std::string& text, const std::string& start) { return text.rfind(start, 0) == 0; }
 
 }  // namespace
@@ -16,7 +14,7 @@ std::optional<SceneSubstitution> scene_substitution(const std::string& scene) {
   const std::size_t equals = scene.find('=');
   if (equals == std::string::npos || equals == 0) return std::nullopt;
   std::string name = scene.substr(0, equals);
-  if (begins(name, kPrefix)) name.erase(0, kPrefix.size());
+  if (begins(name, builtin_prefix)) name.erase(0, builtin_prefix.size());
   if (name.find_first_of("/.#") != std::string::npos) return std::nullopt;
   const std::vector<std::string> known = builtin_scene_names();
   bool is_known = false;
@@ -27,7 +25,7 @@ std::optional<SceneSubstitution> scene_substitution(const std::string& scene) {
                     suggestion(name, known, "a file whose name has a = is given as ./" + scene));
   }
   std::string file = scene.substr(equals + 1);
-  if (file.empty() || begins(file, kPrefix)) {
+  if (file.empty() || begins(file, builtin_prefix)) {
     throw UserError("cannot replace a built-in scene", scene,
                     file.empty() ? "no file is named" : "`" + file + "` is a built-in scene as well",
                     "give " + name + "=FILE, or builtin:NAME alone");
@@ -57,7 +55,7 @@ std::string scene_in_place(const std::string& name, const std::vector<SceneSubst
   for (const SceneSubstitution& substitution : substitutions) {
     if (substitution.name == name) return name + "=" + substitution.file;
   }
-  return kPrefix + name;
+  return builtin_prefix + name;
 }
 
 std::string scene_file(const std::string& scene) {

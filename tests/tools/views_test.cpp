@@ -572,6 +572,18 @@ TEST_F(Views, AJournalOfSomethingElseIsRefusedAndLeftAsItIs) {
   refused(of_file({"--views", "2", "--journal", "/dev/null"}), {"--journal /dev/null", "not a regular file"});
 }
 
+TEST_F(Views, AJournalIsOfTheVeryFileThatTakesABuiltinScenesPlace) {
+  for (const char* scene : {"train=cloud.ply", "builtin:train=cloud.ply"}) {
+    const std::vector<std::string> words{"compare", "--scene",    scene,        "--size",    "16x16",  "--views",
+                                         "2",       "--fidelity", "functional", "--journal", "j.jsonl"};
+    ASSERT_EQ(vrpipe(words).code, 0) << scene;
+    const auto time = std::filesystem::last_write_time(folder() / "cloud.ply");
+    std::filesystem::last_write_time(folder() / "cloud.ply", time + std::chrono::seconds(1));
+    refused(words, {"belongs to another run", "scene.modified"});
+    std::filesystem::remove(folder() / "j.jsonl");
+  }
+}
+
 TEST_F(Views, AJournalThatAnotherProcessWritesIsRefused) {
   const int file = ::open((folder() / "j.jsonl").c_str(), O_RDWR | O_CREAT, 0600);
   struct flock lock {};

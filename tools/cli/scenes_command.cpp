@@ -102,7 +102,7 @@ class ScenesCommand : public Command {
     for (const std::string& text : scenes_) {
       const auto in_place = scene_substitution(text);
       if (in_place) replaced.push_back(text);
-      names.push_back(in_place ? in_place->name : builtin_scene_named(without_prefix(text)).name);
+      names.push_back(in_place ? in_place->name : builtin_scene_named(builtin_name_of(text).value_or(text)).name);
       if (std::count(names.begin(), names.end(), names.back()) > 1) {
         throw UserError("option given twice", "--scene " + names.back(), "a scene is measured once", "give it once");
       }
@@ -112,10 +112,6 @@ class ScenesCommand : public Command {
       result.push_back(scene_in_place(name, substitutions));
     }
     return result;
-  }
-
-  static std::string without_prefix(const std::string& text) {
-    return text.rfind("builtin:", 0) == 0 ? text.substr(std::string("builtin:").size()) : text;
   }
 
   void measure() {
@@ -166,7 +162,7 @@ class ScenesCommand : public Command {
     std::string text;
     const TextStyle style = stdout_style();
     for (const BuiltinSceneInfo& scene : builtin_scenes()) {
-      const std::string full_name = "builtin:" + scene.name;
+      const std::string full_name = builtin_prefix + scene.name;
       const bool is_default = scene.name == kDefaultBuiltinScene;
       Json paper;
       if (scene.stands_for) {

@@ -6,6 +6,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/component/printable.h>
+#include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/scene_substitution.h>
 
@@ -215,7 +216,7 @@ class SweepCommand : public Command {
     for (const StudyAxis& axis : job.study.axes) {
       if (axis.name != "scene") continue;
       for (const std::string& scene : axis.values) {
-        if (scene.rfind("builtin:", 0) != 0)
+        if (!builtin_name_of(scene))
           inputs.push_back({"axis scene", gaussian_file_path(scene_file(scene_of_axis(job, scene)))});
       }
     }

@@ -10,6 +10,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/platforms/configuration.h>
+#include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/mesh.h>
 #include <vrpipe/workloads/scene.h>
 #include <vrpipe/workloads/scene_substitution.h>
@@ -245,7 +246,7 @@ void read_state(const FrameJson& value, const std::string& where, SceneDraw& dra
 SceneDraw read_draw(const FrameJson& command, const std::string& where, const std::filesystem::path& folder) {
   SceneDraw draw;
   draw.scene = text_at(command["draw"], where + ", draw");
-  const bool is_file = draw.scene.rfind("builtin:", 0) != 0;
+  const bool is_file = !builtin_name_of(draw.scene);
   const auto in_folder = [&folder](const std::string& file) { return (folder / file).lexically_normal().string(); };
   const auto in_place = scene_substitution(draw.scene);
   if (in_place) {

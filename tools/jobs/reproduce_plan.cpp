@@ -99,7 +99,7 @@ void choose_scenes(const ReproduceOptions& options, ReproducePlan& plan) {
     }
     const auto scene = std::find_if(plan.scenes.begin(), plan.scenes.end(),
                                     [&name = name](const PlannedScene& each) { return each.name == name; });
-    const bool is_file = scene != plan.scenes.end() && scene->request != "builtin:" + name;
+    const bool is_file = scene != plan.scenes.end() && scene->request != builtin_prefix + name;
     if (!is_file) {
       throw UserError("camera without a scene", "--camera " + name, "no file takes the place of that scene",
                       "add --scene " + name + "=FILE, or --beside");

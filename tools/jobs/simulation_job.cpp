@@ -7,6 +7,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/platforms/software.h>
+#include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/draw_list.h>
 
 #include "for_each_chunk.h"
@@ -52,9 +53,7 @@ std::vector<std::unique_ptr<HeatMaps>> observe_heat(std::vector<RunRequest>& req
 }  // namespace
 
 std::string image_name(const std::string& scene, const std::string& run) {
-  const std::string builtin = "builtin:";
-  std::string name =
-      scene.rfind(builtin, 0) == 0 ? scene.substr(builtin.size()) : std::filesystem::path(scene).stem().string();
+  std::string name = builtin_name_of(scene).value_or(std::filesystem::path(scene).stem().string());
   name += "-" + run;
   std::replace(name.end() - static_cast<std::ptrdiff_t>(run.size()), name.end(), '/', '-');
   return name;

@@ -213,10 +213,9 @@ class ExactImages {
 void check_scene(const SweepJob& job, const std::string& value) {
   SceneRequest request;
   request.scene = scene_file(scene_of_axis(job, value));
-  const std::string builtin = "builtin:";
   std::error_code ignored;
-  if (request.scene.rfind(builtin, 0) == 0) {
-    builtin_scene_named(request.scene.substr(builtin.size()));
+  if (const auto builtin = builtin_name_of(request.scene)) {
+    builtin_scene_named(*builtin);
   } else if (!std::filesystem::exists(gaussian_file_path(request.scene), ignored)) {
     open_scene(request);
   }
@@ -262,7 +261,7 @@ nlohmann::json sweep_identity(const SweepJob& job) {
   const SimulationJob& common = job.common;
   nlohmann::json scenes = nlohmann::json::array();
   const auto add_scene = [&](const std::string& scene) {
-    const bool is_builtin = scene.empty() || scene.rfind("builtin:", 0) == 0;
+    const bool is_builtin = scene.empty() || builtin_name_of(scene);
     scenes.push_back(is_builtin ? nlohmann::json(scene) : scene_identity(scene));
   };
   add_scene(common.scene.scene);

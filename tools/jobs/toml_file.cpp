@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/workloads/builtin_scenes.h>
 
 #include "jobs/toml_text.h"
 
@@ -93,7 +94,7 @@ std::string TomlFile::place(const toml::source_region& region) const {
 
 std::string with_file(const std::string& text, bool is_named,
                       const std::function<std::filesystem::path(const std::filesystem::path&)>& change) {
-  if (text == "-" || text.rfind("builtin:", 0) == 0) return text;
+  if (text == "-" || builtin_name_of(text)) return text;
   const std::size_t equals = is_named ? text.find('=') : std::string::npos;
   const std::size_t name = equals == std::string::npos ? 0 : equals + 1;
   return text.substr(0, name) + change(text.substr(name)).string();

@@ -14,6 +14,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/component/printable.h>
+#include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/gaussian_file.h>
 
 #include "for_each_chunk.h"
@@ -106,7 +107,7 @@ nlohmann::json views_identity(const SimulationJob& job, const ViewsResult& resul
     const std::string folder = fs::weakly_canonical(*job.output, ignored).string();
     images = {{"folder", valid_utf8(folder)}, {"background", job.background}};
   }
-  const bool is_builtin = job.scene.scene.empty() || job.scene.scene.rfind("builtin:", 0) == 0;
+  const bool is_builtin = job.scene.scene.empty() || builtin_name_of(job.scene.scene);
   return {{"schema", "vrpipe.views-journal/1"},
           {"version", VRPIPE_VERSION},
           {"build", build_identity()},

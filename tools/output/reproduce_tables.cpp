@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include <vrpipe/component/printable.h>
+#include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/scene.h>
 
 #include "output/report.h"
@@ -27,7 +28,7 @@ std::string percent(double share) { return number(100 * share, "{:.0f}"); }
 
 std::string scene_label(const Reproduction& of, const SceneFinding& scene) {
   const PlannedScene& planned = of.result.plan.scenes[scene.scene];
-  const bool has_name = planned.request.rfind("builtin:", 0) == 0 || planned.role == PlannedScene::Role::beside;
+  const bool has_name = builtin_name_of(planned.request) || planned.role == PlannedScene::Role::beside;
   return has_name ? planned.name : printable(scene_name(planned.request));
 }
 
@@ -137,7 +138,7 @@ std::vector<std::string> reproduction_heading(const Reproduction& of) {
   for (const PlannedScene& scene : plan.scenes) {
     if (scene.role == PlannedScene::Role::beside) {
       beside.push_back(scene.name);
-    } else if (scene.request.rfind("builtin:", 0) != 0) {
+    } else if (!builtin_name_of(scene.request)) {
       files.push_back(printable(scene_name(scene.request)));
     }
   }

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/workloads/scene_substitution.h>
 
 #include "scene_cache.h"
 #include "scenes.h"
@@ -100,12 +101,17 @@ std::vector<std::string> builtin_scene_names() {
   return names;
 }
 
+std::optional<std::string> builtin_name_of(const std::string& scene) {
+  if (scene.rfind(builtin_prefix, 0) != 0 || scene_substitution(scene)) return std::nullopt;
+  return scene.substr(builtin_prefix.size());
+}
+
 const BuiltinSceneInfo& builtin_scene_named(const std::string& name) {
   for (const BuiltinSceneInfo& info : builtin_scenes()) {
     if (info.name == name) return info;
   }
-  throw UserError("unknown built-in scene", "builtin:" + name, "there is none of that name",
-                  suggestion(name, builtin_scene_names(), "", "builtin:"));
+  throw UserError("unknown built-in scene", builtin_prefix + name, "there is none of that name",
+                  suggestion(name, builtin_scene_names(), "", builtin_prefix));
 }
 
 BuiltinScene make_builtin_scene(const std::string& name, unsigned threads) {

@@ -40,6 +40,12 @@ struct BuiltinScene {
 /// The scene that is drawn when none is named.
 constexpr const char* kDefaultBuiltinScene = "object";
 
+/// What stands before the name of a built-in scene where scenes are named.
+inline const std::string builtin_prefix = "builtin:";
+/// NAME of builtin:NAME; none of what names a file, such as builtin:NAME=FILE.
+/// @throws UserError as scene_substitution()
+std::optional<std::string> builtin_name_of(const std::string& scene);
+
 /// The built-in scenes, the default one first.
 const std::vector<BuiltinSceneInfo>& builtin_scenes();
 std::vector<std::string> builtin_scene_names();
