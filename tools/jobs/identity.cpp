@@ -13,7 +13,9 @@
 #include <nlohmann/json.hpp>
 
 #include <vrpipe/component/printable.h>
+#include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/gaussian_file.h>
+#include <vrpipe/workloads/scene.h>
 #include <vrpipe/workloads/scene_substitution.h>
 
 namespace vrpipe::tools {
@@ -39,6 +41,7 @@ nlohmann::json file_identity(const std::string& name) {
 }
 
 nlohmann::json scene_identity(const std::string& scene) {
+  if (scene.empty() || builtin_name_of(scene)) return scene_name(scene);
   const std::string file = gaussian_file_path(scene_file(scene));
   nlohmann::json identity = file_identity(file);
   if (!identity.is_object()) identity = {{"files", identity}};

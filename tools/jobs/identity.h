@@ -13,7 +13,7 @@ namespace vrpipe::tools {
 
 /// A file, or all files of a folder: paths, sizes and times.
 nlohmann::json file_identity(const std::string& name);
-/// Of SceneRequest::scene, which names a file: its files, and what of them is taken.
+/// Of SceneRequest::scene: the name of a built-in scene; else its files, and what of them is taken.
 nlohmann::json scene_identity(const std::string& scene);
 nlohmann::json settings_identity(const std::vector<Setting>& settings);
 /// Of all that a run's result depends on beside what is drawn, the program and its plugins.

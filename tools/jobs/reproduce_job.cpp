@@ -13,7 +13,6 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/component/printable.h>
-#include <vrpipe/workloads/builtin_scenes.h>
 
 #include "jobs/identity.h"
 #include "jobs/imitation.h"
@@ -109,9 +108,7 @@ nlohmann::json reproduce_identity(const ReproduceJob& job, const ReproducePlan& 
                  {"camera", valid_utf8(choice.camera.value_or("0"))},
                  {"lenses", job.options.lenses}};
     }
-    scenes.push_back(
-        {{"scene", builtin_name_of(scene.request) ? nlohmann::json(scene.request) : scene_identity(scene.request)},
-         {"cameras", std::move(cameras)}});
+    scenes.push_back({{"scene", scene_identity(scene.request)}, {"cameras", std::move(cameras)}});
   }
   std::string points;
   for (const ReproducePoint& point : plan.points) points += point.key.name(plan.scenes) + "\n";

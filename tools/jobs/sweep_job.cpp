@@ -260,10 +260,7 @@ nlohmann::json point_key(const Study& study, std::size_t point) {
 nlohmann::json sweep_identity(const SweepJob& job) {
   const SimulationJob& common = job.common;
   nlohmann::json scenes = nlohmann::json::array();
-  const auto add_scene = [&](const std::string& scene) {
-    const bool is_builtin = scene.empty() || builtin_name_of(scene);
-    scenes.push_back(is_builtin ? nlohmann::json(scene) : scene_identity(scene));
-  };
+  const auto add_scene = [&](const std::string& scene) { scenes.push_back(scene_identity(scene)); };
   add_scene(common.scene.scene);
   for (const StudyAxis& axis : job.study.axes) {
     if (axis.name != "scene") continue;

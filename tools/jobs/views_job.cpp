@@ -14,7 +14,6 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/component/printable.h>
-#include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/gaussian_file.h>
 
 #include "for_each_chunk.h"
@@ -107,12 +106,11 @@ nlohmann::json views_identity(const SimulationJob& job, const ViewsResult& resul
     const std::string folder = fs::weakly_canonical(*job.output, ignored).string();
     images = {{"folder", valid_utf8(folder)}, {"background", job.background}};
   }
-  const bool is_builtin = job.scene.scene.empty() || builtin_name_of(job.scene.scene);
   return {{"schema", "vrpipe.views-journal/1"},
           {"version", VRPIPE_VERSION},
           {"build", build_identity()},
           {"plugins", plugins},
-          {"scene", is_builtin ? nlohmann::json(result.scene) : scene_identity(job.scene.scene)},
+          {"scene", scene_identity(job.scene.scene)},
           {"meshes", meshes},
           {"cameras", cameras_identity(result)},
           {"settings", runs_identity(job)},
