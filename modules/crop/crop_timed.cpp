@@ -89,7 +89,7 @@ class TimedCrop : public TimedUnit {
     } else if (warp.mark != Mark::none) {
       behaviour_->pass(warp.mark);
       if (barriers_.is_barrier(warp.mark)) out_done_.send({warp.mark}, std::max(visible.first, time_.last_blend()));
-    } else if (at_once_ >= warp.count) {
+    } else if (at_once_ >= warp.count && out_.room_from() <= visible.first) {
       left = at_once_ > 1 ? pass<true>(warp, 0, warp.count, visible) : pass<false>(warp, 0, warp.count, visible);
     } else {
       left.first = never;
@@ -151,7 +151,7 @@ class TimedCrop : public TimedUnit {
     if (fetches_ahead) there = std::max(there, look_again(warp, from, looked_up.last));
 
     charge(UnitState::starved, looked_up.first + 1);
-    if (const Cycle room = std::max(out_.last(), out_.room_from()); room > there) {
+    if (const Cycle room = std::max(out_.last(), out_.room_from()); room > there && !joins_signals(there)) {
       charge(UnitState::memory, there);
       charge(UnitState::blocked, room);
       there = room;
@@ -168,6 +168,10 @@ class TimedCrop : public TimedUnit {
     return looked_up;
   }
 
+  /// Whether a quad is blended in the cycle of the last that signalled, from one on, so that its signal would go with it.
+  bool joins_signals(Cycle there) const {
+    return signalled_ < TerminationBeat::capacity && time_.free_from(time_.price(), there) == signalled_at_;
+  }
   /// Takes the time of quads whose sectors are there from a cycle on.
   [[gnu::always_inline]] CycleInterval blend_in_turn(const ShadedWarp& warp, unsigned from, unsigned to, Cycle there) {
     // What moves takes time from blending, from when it does.

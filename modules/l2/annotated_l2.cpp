@@ -17,6 +17,8 @@ class AnnotatedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
   tlm::tlm_target_socket<32, tlm::tlm_base_protocol_types, 1, sc_core::SC_ZERO_OR_MORE_BOUND> socket;
 
   std::uint64_t bytes_per_cycle() const { return requests_.bytes_per_cycle(); }
+  /// Whether requests wait longer than so many cycles, on average.
+  bool waits(Cycle cycles) const { return waited_ > lines_ * cycles; }
   std::uint64_t bytes_in(Cycle end) const { return bytes_in_ - std::min(bytes_in_, requests_.reserved_from(end)); }
   std::uint64_t bytes_out(Cycle end) const { return bytes_out_ - std::min(bytes_out_, responses_.reserved_from(end)); }
 
@@ -35,6 +37,8 @@ class AnnotatedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
       bytes_out_ += out;
       // A request goes to its bank while its last bytes come in.
       Cycle from = std::max(arrival, requests_.take(arrival, in, now) - 1);
+      ++lines_;
+      waited_ += from - arrival;
       const Cycle there = l2.passes(part) ? l2_.pass(part, from, from) : l2_.look_up(part, from, from);
       complete = std::max({complete, responses_.take(from, out, now), there});
     });
@@ -62,6 +66,7 @@ class AnnotatedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
   AnnotatedL2& l2_;
   BandwidthReservation requests_;
   BandwidthReservation responses_;
+  std::uint64_t lines_ = 0, waited_ = 0;
   std::uint64_t bytes_in_ = 0;
   std::uint64_t bytes_out_ = 0;
 };
@@ -178,6 +183,13 @@ Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& fr
   behaviour_->count_bank(index, wait.moved);
   from = std::max(wait.all_there, free_at - cycles);
   return from + behaviour_->bank_cycles(access.bytes);
+}
+
+bool AnnotatedL2::depends_on_order() const {
+  constexpr std::uint64_t long_fetch = 8;  // in quickest ones
+  return (reads_ > 0 && read_cycles_ > long_fetch * reads_ * quickest_read_) ||
+         std::any_of(ports_.begin(), ports_.end(),
+                     [this](const auto& port) { return port->waits(sizes_.latency_cycles / 2); });
 }
 
 std::vector<OccupancyPart> AnnotatedL2::parts(Cycle end) const {

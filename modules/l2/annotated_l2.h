@@ -32,9 +32,8 @@ class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private 
   MemoryBytes memory_bytes() const override { return memory_.moved(); }
   MemoryBehaviour& behaviour() override { return *behaviour_; }
   const StatisticSet& statistics() const override { return statistics_; }
-  double waiting_of_reads() const override {
-    return reads_ == 0 ? 1 : static_cast<double>(read_cycles_) / static_cast<double>(reads_ * quickest_read_);
-  }
+  /// Both limits are measured: benchmarks/lt_errors.
+  bool depends_on_order() const override;
   std::vector<OccupancyPart> parts(Cycle end) const override;
 
  private:

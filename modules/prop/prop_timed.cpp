@@ -3,6 +3,7 @@
 
 #include "prop/reorder_buffer.h"
 
+#include <vrpipe/kernel/rate.h>
 #include <vrpipe/model/timed.h>
 #include <vrpipe/pipeline/early_tests.h>
 #include <vrpipe/pipeline/late_plan.h>
@@ -50,14 +51,14 @@ class TimedProp : public TimedUnit {
                      return collect(*item.warp, visible.first);
                    }),
         order_(time_.order, context),
-        there_(time_.quads_per_cycle),
-        back_(time_.quads_per_cycle),
+        there_{BatchLimit(time_.quads_per_cycle), {}},
+        back_{BatchLimit(time_.quads_per_cycle), {}},
         color_(time_.color_rate.items),
         beats_a_cycle_(ColorBeat::in_a_cycle(time_.color_rate)),
         late_(time_.quads_per_cycle) {
     out_test_.set_pipeline(time_.latency_cycles - 1, 1);
     out_survivors_.set_pipeline(time_.latency_cycles - 1, 1);
-    out_color_.set_pipeline(time_.latency_cycles - 1, 1);
+    out_color_.set_pipeline(time_.latency_cycles - 1, beats_a_cycle_);
     out_late_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
     out_late_.set_optional();
     in_late_.set_optional();
@@ -71,12 +72,26 @@ class TimedProp : public TimedUnit {
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
-  CycleInterval forward(unsigned work, const BinItem& item, CycleInterval visible, BatchServer& passage,
+  /// A way through the unit, which bins take beat by beat.
+  struct Passage {
+    BatchLimit limit;
+    BeatWidth width;
+  };
+  CycleInterval forward(unsigned work, const BinItem& item, CycleInterval visible, Passage& passage,
                         TimedOut<BinItem>& out) {
-    passage.hold(out.last());
-    const CycleInterval at = passage.take(visible, item.quads);
+    const unsigned width = passage.width.of(item.quads, item.beats);
+    const Cycle free_from = std::max(out.last(), out.room_from());
+    CycleInterval at;
+    unsigned beat = 0;
+    unsigned quads = item.quads;
+    do {
+      const unsigned beats_quads = std::max(std::min(width, quads), 1U);
+      quads -= std::min(beats_quads, quads);
+      at.last = passage.limit.take(beats_quads, std::max(visible.of_part(beat, item.beats), free_from));
+      if (beat == 0) at.first = at.last;
+    } while (++beat < item.beats);
     const CycleInterval taken = out.send(item, at, item.beats);
-    passage.hold(taken.last + 1);
+    passage.limit.hold(taken.last);
     did(work, item.quads, taken.last);
     return taken;
   }
@@ -240,8 +255,8 @@ class TimedProp : public TimedUnit {
   TimedIn<ShadedWarpItem> in_shaded_;
   ReorderBuffer order_;
   bool is_awake_ = false;
-  BatchServer there_;     ///< to the tests, or past them
-  BatchServer back_;      ///< from the tests
+  Passage there_;         ///< to the tests, or past them
+  Passage back_;          ///< from the tests
   ThroughputPort color_;  ///< in parts of a cycle and of a quad: a cycle passes `color_rate.items`
   const unsigned beats_a_cycle_;
   // In a frame with late tests:

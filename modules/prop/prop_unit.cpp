@@ -60,21 +60,20 @@ class PropUnit : public Unit {
 
  private:
   /// A way through the unit, `quads_per_cycle` wide.
-  struct BatchServer {
+  struct Passage {
     unsigned work;
     BatchLimit limit;
     Cycle free_at = 0;
   };
 
   /// Moves beats from one port to the next; a beat wider than the unit takes several cycles.
-  bool forward(BatchServer& passage, StreamIn<QuadBeat>& from, StreamOut<QuadBeat>& to, Cycle now) {
+  bool forward(Passage& passage, StreamIn<QuadBeat>& from, StreamOut<QuadBeat>& to, Cycle now) {
     if (now < passage.free_at || !from.ready() || to.credits() == 0) return false;
     forward_beats(passage, from, to, now);
     return true;
   }
   // Out of line: in most cycles nothing can move.
-  [[gnu::noinline]] void forward_beats(BatchServer& passage, StreamIn<QuadBeat>& from, StreamOut<QuadBeat>& to,
-                                       Cycle now) {
+  [[gnu::noinline]] void forward_beats(Passage& passage, StreamIn<QuadBeat>& from, StreamOut<QuadBeat>& to, Cycle now) {
     while (from.ready() && to.credits() > 0) {
       const QuadBeat& beat = from.front();
       const unsigned width = std::max<unsigned>(beat.count, 1);
@@ -273,8 +272,8 @@ class PropUnit : public Unit {
   std::unique_ptr<PropBehaviour> behaviour_;
   const PropTime time_;
   const bool tests_;
-  BatchServer there_;  ///< to the tests, or past them
-  BatchServer back_;   ///< from the tests
+  Passage there_;  ///< to the tests, or past them
+  Passage back_;   ///< from the tests
   ReorderBuffer order_;
   RateLimit color_limit_;
   ReorderBuffer::Waiting current_;  ///< being handed to CROP, from `index_` on; none without a warp

@@ -3,6 +3,7 @@
 #include "sm/active_cores.h"
 #include "sm/fragment_programs.h"
 #include "sm/hand_over.h"
+#include "sm/timed_scheduler.h"
 #include "sm/timed_sm_memory.h"
 
 #include <vrpipe/kernel/rate.h>
@@ -16,7 +17,8 @@ namespace {
 /// The SM array at lt. Ports as in sm_unit.cpp. Fragment warps issue segment by segment, first come, first served,
 /// and go to PROP as they are done. An array with room to spare has a scheduler for all of a warp's instructions at once
 /// and waits for all its latencies after that, in launch order: nothing waits for what that makes late.
-/// Vertex warps take issue slots from fragment warps but do not wait for them: they are few.
+/// Calls nest, and what a vertex warp leads to runs far ahead of the next one: so it is handed on when it can go, or its slot
+/// is needed, and no earlier; those behind it are shaded, and write, as the fragment warps come to their time.
 /// With the memory port connected a warp fetches what it reads when it is launched, as in sm_unit.cpp.
 class TimedSm : public TimedUnit {
  public:
@@ -42,13 +44,13 @@ class TimedSm : public TimedUnit {
                   [this](const Warp& warp, CycleInterval visible) { return launch(warp, visible.first); }),
         in_vertices_(*this, "in_vertices",
                      [this](const VertexWarp& warp, CycleInterval visible) {
-                       return shade_vertices(warp, visible.first);
+                       return launch_vertices(warp, visible.first);
                      }),
         hand_over_(time_, context),
-        scheduler_free_at_(time_.schedulers(), 0),
-        issues_(roomy_ ? 0 : scheduler_free_at_.size()),
+        schedulers_(time_.schedulers()),
         free_of_core_(time_.cores, time_.warps_per_core),
-        vertex_slots_(time_.vertex_warps, 0) {
+        vertex_slots_(time_.vertex_warps, 0),
+        vertices_wait_(context.placement.gpcs == 1) {
     fragment_.for_each([&](const Program& each) { waiting_.resize(std::max(waiting_.size(), each.size())); });
     if (!EffectGate(context, "cache.details").is_active()) l1_statistics_.leave_out_details();
     free_slots_ = time_.fragment_slots();
@@ -56,7 +58,7 @@ class TimedSm : public TimedUnit {
     in_warps_.set_comes_ahead();
   }
 
-  bool idle() const override { return next_event() == never; }
+  bool idle() const override { return next_event() == never && vertices_.empty(); }
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket(); }
   unsigned memory_bytes_per_cycle() const override { return time_.memory_bytes_per_cycle(); }
@@ -109,7 +111,8 @@ class TimedSm : public TimedUnit {
     return {sum};
   }
 
-  /// Whether a warp can be launched in every cycle, and consecutive ones find schedulers that differ.
+  /// Whether a warp can be launched in every cycle, beside all vertex warps, which are no longer, and consecutive ones find
+  /// schedulers that differ.
   static bool is_roomy(const SmTime& time, const Frame& frame) {
     return has_room_for(FragmentShader::splat, time) &&
            std::all_of(frame.draws().begin(), frame.draws().end(),
@@ -119,7 +122,11 @@ class TimedSm : public TimedUnit {
     const Cycle cycles_per_instruction = time.cycles_per_instruction();
     const Segment fragment = program(time.fragment_program(shader), {}, true).front();
     const Segment merged = program(time.fragment_program(shader), time.merge, true).front();
-    return time.schedulers() >= fragment.all() * cycles_per_instruction &&
+    const Segment vertex = program(time.vertex, {}, true).front();
+    const Cycle vertex_issue = vertex.all() * cycles_per_instruction;
+    const Cycle fragment_issue = fragment.all() * cycles_per_instruction;
+    const Cycle of_vertices = time.vertex_warps * vertex_issue / (vertex_issue + vertex.stall_cycles);
+    return vertex_issue <= fragment_issue && time.schedulers() >= fragment_issue + of_vertices &&
            time.fragment_slots() >= 2 * (merged.all() * cycles_per_instruction + merged.stall_cycles) &&
            time.warps_to_one_core >= time.schedulers_per_core && 2 * time.warps_to_one_core <= time.warps_per_core;
   }
@@ -184,6 +191,7 @@ class TimedSm : public TimedUnit {
     }
     launch = take_slot(warp.tile, hand_over_.free_from(launch));
     charge(UnitState::blocked, launch);
+    while (next_vertex_event() <= launch) do_vertex_event();
     Cycle there = 0;
     if (fetches_) {
       const TimedSmMemory::Fetch fetch = memory_.fetch_attributes(warp, core_, launch);
@@ -242,20 +250,18 @@ class TimedSm : public TimedUnit {
   /// Issues a segment on a scheduler; returns when the next can issue. If it is the first, `there` is when its attributes
   /// are, for which what comes behind the fetching instructions waits.
   Cycle issue(const Segment& segment, std::size_t scheduler, Cycle from, Cycle there = 0) {
-    Cycle& free_at = scheduler_free_at_[scheduler];
-    const Cycle begin = std::max(free_at, from);
-    if (!roomy_) {
-      issues_[scheduler].forget_before(next_vertex_launch_);
-      issues_[scheduler].later.push({from, begin + segment.all() * cycles_per_instruction_});
-    }
+    const Cycle cycles = segment.all() * cycles_per_instruction_;
+    TimedScheduler& issues = schedulers_[scheduler];
+    const Cycle begin =
+        roomy_ ? issues.append(from, cycles) : issues.put(from, cycles, std::min(from, vertices_launch_from_));
     const Cycle merge = begin + segment.instructions * cycles_per_instruction_;
-    free_at = merge + segment.merge_instructions * cycles_per_instruction_;
-    frame_lasts(free_at);  // the warp's quads end after that
+    const Cycle end = begin + cycles;
+    frame_lasts(end);  // the warp's quads end after that
     if (segment.instructions > 0) did(SmWork::fragment, segment.instructions, begin, merge);
-    if (segment.merge_instructions > 0) did(SmWork::merge, segment.merge_instructions, merge, free_at);
-    charge(UnitState::busy, free_at);
+    if (segment.merge_instructions > 0) did(SmWork::merge, segment.merge_instructions, merge, end);
+    charge(UnitState::busy, end);
     const Cycle fetched = begin + segment.fetch.instructions * cycles_per_instruction_;
-    return free_at + segment.stall_cycles + (std::max(fetched, there) - fetched);
+    return end + segment.stall_cycles + (std::max(fetched, there) - fetched);
   }
   /// The same for a warp that waits; those that waited for its scheduler before it have issued.
   void issue(const Event& warp, std::size_t segment) {
@@ -268,14 +274,6 @@ class TimedSm : public TimedUnit {
       done_.push_in_order({next, warp.flight}, &Event::at);
       last_done_ = std::max(last_done_, next);
     }
-  }
-
-  /// When a vertex warp that is ready in a cycle issues: behind the fragment warps that were ready before it, but not behind
-  /// later ones, which have issued already, since what a vertex warp leads to comes before the next one.
-  Cycle turn_on(std::size_t scheduler, Cycle ready) {
-    if (roomy_) return ready;
-    issues_[scheduler].forget_before(ready + 1);
-    return std::max(ready, issues_[scheduler].end);
   }
 
   /// Issues what waits from cycles up to this one, in the order of waiting.
@@ -321,35 +319,86 @@ class TimedSm : public TimedUnit {
     out_shaded_.send({&shaded}, done);
   }
 
-  Cycle shade_vertices(const VertexWarp& warp, Cycle visible) {
-    Cycle launch = std::max(visible, next_vertex_launch_);
-    Cycle done = 0;
-    if (warp.mark == Mark::none) {
-      launch = std::max(launch, vertex_slots_[vertex_turn_]);
-      const std::size_t scheduler = vertex_scheduler_++ % scheduler_free_at_.size();
-      const Cycle issue = vertex_.instructions * cycles_per_instruction_;
-      const Cycle ready = fetches_ ? memory_.fetch_vertices(warp, launch) : launch;
-      done = turn_on(scheduler, ready) + issue + vertex_.stall_cycles;
-      Cycle& free_at = scheduler_free_at_[scheduler];
-      free_at = std::max(free_at, launch) + issue;
-      did(SmWork::vertex, vertex_.instructions, free_at - issue, free_at);
-      if (lacks_fetch_) fetch_gate_.enter();
-      behaviour_->shade_and_count(warp);
-    }
+  Cycle launch_vertices(const VertexWarp& warp, Cycle visible) {
+    const Cycle now = clock.domain->now();
+    while (next_vertex_event() <= now) do_vertex_event();
+    if (vertices_.size() == time_.vertex_warps) hand_on_vertices();
+    const Cycle launch = std::max({visible, next_vertex_launch_, vertex_slots_[vertex_turn_]});
     next_vertex_launch_ = launch + 1;
-    vertex_slots_[vertex_turn_] = hand_on_vertices(warp, std::max(done, launch)) + 1;
-    vertex_turn_ = vertex_turn_ + 1 == time_.vertex_warps ? 0 : vertex_turn_ + 1;
+    vertices_launch_from_ = warp.mark == Mark::end_of_frame ? never : next_vertex_launch_;
+    vertex_turn_ = next_of(vertex_turn_);
+    vertices_.push({warp, launch, 0});
+    // A mark may be waited for.
+    while (!vertices_.empty() && (warp.mark != Mark::none || !vertices_wait_)) hand_on_vertices();
+    if (vertices_.size() == 1) clock.domain->wake(clock.unit, std::max(launch, now + 1));
     return launch;
   }
-
-  /// Sends a vertex warp that is shaded, in order, once its attributes have been sent; returns when it is taken.
-  Cycle hand_on_vertices(const VertexWarp& warp, Cycle done) {
-    if (fetches_) {
-      if (warp.mark == Mark::none) done = memory_.write_attributes(warp, done);
-      if (warp.mark != Mark::none) memory_.send_until(never);
+  /// Hands vertex warps on when they can go.
+  Cycle tick(Cycle now) override {
+    while (!vertices_.empty()) {
+      const Cycle due = std::max(vertices_.front().at, written_ > 0 ? out_vertices_.room_from() : 0);
+      if (due > now) return due;
+      if (written_ > 0) {
+        hand_on_vertices();
+      } else if (shaded_ > 0) {
+        write_first_vertices();
+      } else {
+        do_vertex_event();
+      }
     }
-    vertices_done_ = std::max(vertices_done_, done);
-    return out_vertices_.send(warp, vertices_done_).first;
+    return never;
+  }
+
+  /// A vertex warp from its launch until it is handed on.
+  struct VertexFlight {
+    VertexWarp warp;
+    Cycle at = 0;         ///< it is launched, then shaded, then written
+    unsigned unsent = 0;  ///< of its writes
+  };
+  /// The cycle in which one is shaded, or writes.
+  Cycle next_vertex_event() const {
+    const Cycle launch = shaded_ < vertices_.size() ? vertices_[shaded_].at : never;
+    return fetches_ ? std::min(launch, memory_.next_write()) : launch;
+  }
+  [[gnu::noinline]] void do_vertex_event() {
+    if (shaded_ < vertices_.size() && vertices_[shaded_].at <= next_vertex_event()) {
+      shade_vertices(vertices_[shaded_++]);
+    } else {
+      VertexFlight& flight = vertices_[written_];
+      flight.at = memory_.send_write();
+      --flight.unsent;
+    }
+    while (written_ < shaded_ && vertices_[written_].unsent == 0) ++written_;
+  }
+  void shade_vertices(VertexFlight& flight) {
+    if (flight.warp.mark != Mark::none) return;
+    TimedScheduler& scheduler = schedulers_[vertex_scheduler_++ % schedulers_.size()];
+    const Cycle cycles = vertex_.instructions * cycles_per_instruction_;
+    const Cycle ready = fetches_ ? memory_.fetch_vertices(flight.warp, flight.at) : flight.at;
+    const Cycle begin = roomy_ ? ready : scheduler.put_late(ready, cycles);
+    did(SmWork::vertex, vertex_.instructions, begin, begin + cycles);
+    flight.at = begin + cycles + vertex_.stall_cycles;
+    if (lacks_fetch_) fetch_gate_.enter();
+    behaviour_->shade_and_count(flight.warp);
+    if (fetches_) flight.unsent = memory_.write_attributes(flight.warp, flight.at);
+  }
+
+  /// Until those of the first have been sent.
+  void write_first_vertices() {
+    while (written_ == 0) do_vertex_event();
+  }
+  void hand_on_vertices() {
+    write_first_vertices();
+    const VertexFlight flight = vertices_.front();
+    vertices_.pop();
+    --shaded_;
+    --written_;
+    vertices_done_ = std::max(vertices_done_, flight.at);
+    vertex_slots_[first_vertex_slot_] = out_vertices_.send(flight.warp, vertices_done_).first + 1;
+    first_vertex_slot_ = next_of(first_vertex_slot_);
+  }
+  std::uint32_t next_of(std::uint32_t vertex_slot) const {
+    return vertex_slot + 1 == time_.vertex_warps ? 0 : vertex_slot + 1;
   }
 
   Cycle free(const WarpRelease& release, Cycle visible) {
@@ -376,20 +425,7 @@ class TimedSm : public TimedUnit {
   TimedIn<Warp> in_warps_;
   TimedIn<VertexWarp> in_vertices_;
   HandOver hand_over_;
-  std::vector<Cycle> scheduler_free_at_;
-  /// Of a scheduler, that vertex warps may come before.
-  struct Issues {
-    struct Issue {
-      Cycle ready = 0;
-      Cycle end = 0;
-    };
-    Ring<Issue> later;
-    Cycle end = 0;  ///< of all that were ready earlier
-    void forget_before(Cycle ready) {
-      for (; !later.empty() && later.front().ready < ready; later.pop()) end = later.front().end;
-    }
-  };
-  std::vector<Issues> issues_;
+  std::vector<TimedScheduler> schedulers_;
   std::vector<Flight> flights_;
   std::vector<std::uint32_t> free_flights_;
   std::vector<Ring<Event>> waiting_;  ///< for a scheduler: by the segment that is to issue, each by cycle
@@ -404,8 +440,14 @@ class TimedSm : public TimedUnit {
   std::uint32_t free_slots_ = 0;     ///< of all cores
   std::vector<Cycle> vertex_slots_;  ///< a ring
   std::uint32_t vertex_turn_ = 0;
+  std::uint32_t first_vertex_slot_ = 0;
+  Ring<VertexFlight> vertices_;  ///< in order, from the first slot to this turn's
+  std::size_t shaded_ = 0;       ///< of these, from the first on
+  std::size_t written_ = 0;
+  const bool vertices_wait_;  ///< to be handed on; across GPCs what comes behind them follows the order of calls
   std::uint64_t vertex_scheduler_ = 0;
   Cycle next_vertex_launch_ = 0;
+  Cycle vertices_launch_from_ = 0;  ///< the same while any are to come
   Cycle vertices_done_ = 0;
   Cycle next_launch_ = 0;
   Cycle last_done_ = 0;

@@ -14,8 +14,7 @@
 
 namespace vrpipe {
 
-/// As sm_memory.h, at lt: each access gets its cycle when its warp is launched or shaded. L1s see the launches
-/// in their order.
+/// As sm_memory.h, at lt: who calls does so in the order of time as far as he can. L1s see the launches in their order.
 class TimedSmMemory {
  public:
   TimedSmMemory(PortOwner& owner, const RenderContext& context, const SmTime& time, SectoredCacheStatistics& statistics)
@@ -24,8 +23,7 @@ class TimedSmMemory {
         port_(owner, "memory"),
         statistics_(statistics),
         cores_(time.cores),
-        answered_(timing_.attribute_writes, 0),
-        sends_at_once_(context.placement.gpcs > 1) {}
+        answered_(timing_.attribute_writes, 0) {}
 
   tlm::tlm_initiator_socket<32>& socket() { return port_.socket; }
   const MemoryBytes& moved() const { return port_.moved(); }
@@ -36,28 +34,26 @@ class TimedSmMemory {
 
   /// When what a vertex warp reads is there, asked for in cycle `at`.
   Cycle fetch_vertices(const VertexWarp& warp, Cycle at) {
-    send_until(at);
     Cycle there = at;
     traffic_.read_vertices(warp,
                            [&](const MemoryRequest& request) { there = std::max(there, port_.access(request, at)); });
     return there;
   }
-  /// When the last of what it writes is sent, from cycle `at` on: each once the one as many before it as may be in flight
-  /// has been answered. The memory gets them with `send_until`, or when they are read: at lt the next warp comes later,
-  /// and reads its vertices earlier. Where the arrays of other GPCs may read them, it gets them at once.
-  Cycle write_attributes(const VertexWarp& warp, Cycle at) {
-    traffic_.write_attributes(warp, [&](const MemoryRequest& request) {
-      if (unsent_.size() == answered_.size()) send();
-      at = std::max(at, answered_[next_write_]);
-      next_write_ = next_write_ + 1 == answered_.size() ? 0 : next_write_ + 1;
-      unsent_.push({request, at});
-    });
-    if (sends_at_once_) send_until(never);
-    return at;
+  /// What a vertex warp that is shaded in a cycle writes is to be sent; returns how many accesses that is.
+  unsigned write_attributes(const VertexWarp& warp, Cycle done) {
+    const std::size_t before = unsent_.size();
+    traffic_.write_attributes(warp, [&](const MemoryRequest& request) { unsent_.push({request, done}); });
+    return static_cast<unsigned>(unsent_.size() - before);
   }
-  /// Sends what is to be written up to a cycle.
-  void send_until(Cycle until) {
-    while (!unsent_.empty() && unsent_.front().at <= until) send();
+  /// When the next write goes: once the one as many before it as may be in flight has been answered.
+  Cycle next_write() const { return unsent_.empty() ? never : std::max(unsent_.front().shaded, answered_[turn_]); }
+  /// Sends it; returns when.
+  Cycle send_write() {
+    const Cycle at = next_write();
+    answered_[turn_] = port_.access(traffic_.in_buffer(unsent_.front().request), at);
+    turn_ = turn_ + 1 == answered_.size() ? 0 : turn_ + 1;
+    unsent_.pop();
+    return at;
   }
   struct Fetch {
     Cycle looked_up;  ///< the warp can be launched
@@ -106,13 +102,6 @@ class TimedSmMemory {
     std::vector<std::array<Cycle, sectors_of_a_line>> there;  ///< by line and sector: since when
   };
 
-  /// Sends the next write.
-  void send() {
-    answered_[next_sent_] = port_.access(traffic_.in_buffer(unsent_.front().request), unsent_.front().at);
-    next_sent_ = next_sent_ + 1 == answered_.size() ? 0 : next_sent_ + 1;
-    unsent_.pop();
-  }
-
   /// The same where the core has none, and past it: each warp asks for all that it reads.
   Fetch fetch_past(L1& l1, Cycle at) {
     Cycle there = 0;
@@ -130,9 +119,6 @@ class TimedSmMemory {
     run = take_sector_run(missing, std::min(sectors_of_a_line, timing_.l1_mshrs));
     at = l1.mshrs.free_from(at, run.count);
     // Addresses of writes increase.
-    while (reads_.traffic == MemoryTraffic::attribute && !unsent_.empty() &&
-           unsent_.front().request.address < line + AttributeTraffic::line_bytes)
-      send();
     const Cycle there = port_.access(traffic_.read(reads_.traffic, line, run), at);
     l1.mshrs.take(run.count, there);
     return there;
@@ -153,14 +139,12 @@ class TimedSmMemory {
   SectoredCacheStatistics& statistics_;
   const std::uint32_t cores_;
   std::vector<Cycle> answered_;  ///< the last writes, as many as may be in flight: a ring
+  std::size_t turn_ = 0;
   struct Write {
     MemoryRequest request;
-    Cycle at = 0;
+    Cycle shaded = 0;
   };
   Ring<Write> unsent_;
-  std::size_t next_write_ = 0;  ///< in the ring of answers
-  std::size_t next_sent_ = 0;
-  const bool sends_at_once_;
   std::vector<L1> l1s_;  ///< by core
   AttributeTraffic::FragmentReads reads_;
 };

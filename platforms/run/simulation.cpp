@@ -444,13 +444,12 @@ void set_time(const Configuration& configuration, Cycle cycles, RunResult& resul
   result.milliseconds = static_cast<double>(cycles) / (configuration.platform().frequency_mhz * 1e3);
 }
 
-/// At lt, of what was measured: benchmarks/lt_errors. A memory that is the bottleneck, or whose reads wait for one another, gets its
-/// requests in the order of calls, and answers later ones as if those before were all.
+/// At lt, of what was measured: benchmarks/lt_errors. A memory that is the bottleneck, or whose requests wait for one another, gets
+/// them in the order of calls, and answers later ones as if those before were all.
 std::optional<double> expected_error_of(const Gpu& gpu, const RunResult& result) {
   if (!result.bottleneck || !result.outside_validated_range.empty()) return std::nullopt;
-  constexpr double waits = 8;  // times as long as the quickest read
   const bool is_ordered_by_memory = std::any_of(gpu.memories().begin(), gpu.memories().end(), [&](const auto& placed) {
-    return placed.memory->waiting_of_reads() > waits || placed.instance->path == result.bottleneck->unit;
+    return placed.memory->depends_on_order() || placed.instance->path == result.bottleneck->unit;
   });
   return is_ordered_by_memory ? 10 : expected_error_percent(result.bottleneck->occupancy);
 }

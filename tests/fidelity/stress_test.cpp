@@ -130,6 +130,10 @@ TEST(ExpectedError, IsLargeWhereRequestsWaitForOneAnotherInMemory) {
   EXPECT_LT(*at_lt({}).expected_error_percent, 3);
   EXPECT_EQ(at_lt({{"dram", "channels", "1"}, {"dram", "tccd_l_ps", "100000"}}).expected_error_percent, 10)
       << "for long";
+  EXPECT_EQ(at_lt({{"sm", "cores", "4"}, {"draw", "warps_per_1024_cycles", "1000"}, {"sm", "vertex_warps", "100"}})
+                .expected_error_percent,
+            10)
+      << "at a port of 128 bytes a cycle";
   const RunResult slow = at_lt({{"l2", "frequency_mhz", "1"}});
   EXPECT_EQ(slow.bottleneck->unit, "l2");
   EXPECT_EQ(slow.expected_error_percent, 10);
@@ -160,6 +164,53 @@ TEST(Stress, AFarMemoryAndBinsOfOneQuadDoNotDelayFills) {
   const auto cycles = static_cast<double>(*run(request, draw).cycles);
   request.fidelity = Fidelity::lt;
   EXPECT_NEAR(static_cast<double>(*run(request, draw).cycles) / cycles, 1, 0.05);
+}
+
+void expect_lt_is_near(RunRequest request, const Draw& draw, double tolerance) {
+  const auto cycles = static_cast<double>(*run(request, draw).cycles);
+  request.fidelity = Fidelity::lt;
+  EXPECT_NEAR(static_cast<double>(*run(request, draw).cycles) / cycles, 1, tolerance);
+}
+
+/// Fewer than CROP blends in a cycle would otherwise signal alone, each after as long a way.
+TEST(Stress, SignalsOfACycleGoTogetherOnALongWay) {
+  for (const char* platform : {"gh100-gpc", "agx-orin"}) {
+    SCOPED_TRACE(platform);
+    expect_lt_is_near(on(platform, request_of("het", Fidelity::cycle,
+                                              [](RunRequest& r) {
+                                                r.format = ColorFormat::rgba8;
+                                                r.termination = Termination::strict;
+                                                r.settings = {{"link.crop.terminations", "latency_cycles", "2000"}};
+                                              })),
+                      random_draw(96, 96, 1500, 8), 0.02);
+  }
+}
+
+TEST(Stress, BeatsThatAreWiderThanPropPassAtItsRate) {
+  expect_lt_is_near(request_of("qm", Fidelity::cycle,
+                               [](RunRequest& r) {
+                                 r.settings = {{"prop", "quads_per_cycle", "6"}, {"tc", "bin_quads", "13"}};
+                               }),
+                    random_draw(160, 120, 2000, 6), 0.02);
+}
+
+TEST(Stress, AFarCropHasPlacesForAllBeatsOfACycle) {
+  expect_lt_is_near(
+      request_of(
+          "baseline", Fidelity::cycle,
+          [](RunRequest& r) {
+            r.format = ColorFormat::rgba8;
+            r.settings = {{"prop", "color_bytes_per_cycle", "128"}, {"link.prop.color", "latency_cycles", "900"}};
+          }),
+      random_draw(96, 96, 1500, 8), 0.03);
+}
+
+TEST(Stress, LongVertexShadersWaitForFragmentsAndFragmentsForThem) {
+  expect_lt_is_near(on("desktop", request_of("baseline", Fidelity::cycle,
+                                             [](RunRequest& r) {
+                                               r.settings = {{"sm", "vertex_instructions", "1000"}};
+                                             })),
+                    random_draw(160, 120, 2000, 6), 0.05);
 }
 
 }  // namespace

@@ -249,18 +249,6 @@ TEST(ThroughputPort, PartsOfAnItemMayGoInNeighbouringCycles) {
   EXPECT_EQ(taken(50, 0), (std::pair<Cycle, Cycle>(50, 50))) << "nothing takes nothing";
 }
 
-TEST(BatchServer, ABatchBeginsWithItsFirstItemsAndEndsNoEarlierThanItsLastCome) {
-  BatchServer passage(8);
-  const auto taken = [&](CycleInterval visible, unsigned items) {
-    const CycleInterval span = passage.take(visible, items);
-    return std::pair(span.first, span.last);
-  };
-  EXPECT_EQ(taken({10, 13}, 27), (std::pair<Cycle, Cycle>(10, 13)));
-  EXPECT_EQ(taken({11, 11}, 3), (std::pair<Cycle, Cycle>(14, 14)));
-  EXPECT_EQ(taken({20, 30}, 3), (std::pair<Cycle, Cycle>(20, 30)));
-  EXPECT_EQ(taken({20, 20}, 17), (std::pair<Cycle, Cycle>(31, 33)));
-}
-
 TEST(CycleInterval, SpreadsPartsEvenly) {
   const CycleInterval dense(10, 13);
   EXPECT_EQ(dense.of_part(0, 4), 10U);

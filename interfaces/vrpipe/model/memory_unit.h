@@ -32,9 +32,8 @@ class MemoryUnit {
   virtual void close(Cycle end) { static_cast<void>(end); }
   /// That depend on time; those of the functional model are reported with them.
   virtual const StatisticSet& statistics() const = 0;
-  /// At `lt`: how many times as long as the quickest one a read from the memory below took, on average. Where they wait for one
-  /// another, the order tells in which they are asked for.
-  virtual double waiting_of_reads() const { return 1; }
+  /// At `lt`: whether requests wait for one another so long that it tells in which order they are asked for.
+  virtual bool depends_on_order() const { return false; }
   /// What its time went on, up to the end of the frame.
   virtual std::vector<OccupancyPart> parts(Cycle end) const = 0;
 };

@@ -113,27 +113,6 @@ class ThroughputPort {
   Cycle cycle_ = 0;
 };
 
-/// The way of batches through a unit, so many items a cycle: a batch begins in a cycle of its own, when its first items
-/// have come, and does not end before its last.
-class BatchServer {
- public:
-  explicit BatchServer(unsigned per_cycle) : per_cycle_(std::max(per_cycle, 1U)) {}
-  /// Cycles that so many items take.
-  unsigned cycles(unsigned items) const { return std::max(static_cast<unsigned>(per_cycle_.quotient_up(items)), 1U); }
-  CycleInterval take(CycleInterval visible, unsigned items) {
-    const Cycle first = std::max(visible.first, free_at_);
-    const CycleInterval span(first, std::max(first + cycles(items) - 1, visible.last));
-    free_at_ = span.last + 1;
-    return span;
-  }
-  /// Nothing goes before this cycle any more.
-  void hold(Cycle cycle) { free_at_ = std::max(free_at_, cycle); }
-
- private:
-  Divisor per_cycle_;
-  Cycle free_at_ = 0;
-};
-
 /// So many places, each taken until a cycle that is known, and freed in the order in which they were taken.
 class SlotPool {
  public:
