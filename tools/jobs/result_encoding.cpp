@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <optional>
 #include <stdexcept>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -18,10 +20,10 @@ namespace {
 using Record = nlohmann::json;
 
 /// The first of some names, "one, two, three", which is taken off.
-std::string next_name(std::string& names) {
+std::string_view next_name(std::string_view& names) {
   const std::size_t end = std::min(names.find(','), names.size());
-  std::string name = names.substr(0, end);
-  names.erase(0, names.find_first_not_of(", ", end));
+  const std::string_view name = names.substr(0, end);
+  names.remove_prefix(std::min(names.find_first_not_of(", ", end), names.size()));
   return name;
 }
 
@@ -36,7 +38,7 @@ std::string next_name(std::string& names) {
   }
 
 template <class Visit, class... Members>
-void visit_all(std::string names, const Visit& visit, Members&... members) {
+void visit_all(std::string_view names, const Visit& visit, Members&... members) {
   (visit(next_name(names), members), ...);
 }
 
@@ -102,8 +104,8 @@ struct Writer {
   template <class Struct>
   static Record of(const Struct& value) {
     Record json = Record::object();
-    each_member(value, [&](const std::string& name, const auto& member) {
-      if constexpr (!stays<std::decay_t<decltype(member)>>) json[name] = of(member);
+    each_member(value, [&](std::string_view name, const auto& member) {
+      if constexpr (!stays<std::decay_t<decltype(member)>>) json[std::string(name)] = of(member);
     });
     return json;
   }
@@ -177,8 +179,9 @@ struct Reader {
   static void read(const Record& json, Struct& value, const std::string& where) {
     check(json.is_object(), where);
     std::size_t expected = 0;
-    each_member(value, [&](const std::string& name, auto& member) {
+    each_member(value, [&](std::string_view of_member, auto& member) {
       if constexpr (!stays<std::decay_t<decltype(member)>>) {
+        const std::string name(of_member);
         const auto found = json.find(name);
         if (found == json.end()) refuse_record(where + " has no " + name);
         read(*found, member, where + "." + name);
@@ -194,37 +197,117 @@ struct Reader {
   }
 };
 
-/// Looks through a document before it is built, which takes the stack for every level of it.
-class Examination : public nlohmann::json_sax<Record> {
+/// Numbers as they lie in memory, and before what there are several of how many.
+class ByteWriter {
  public:
-  /// What is wrong with it; none otherwise.
-  static std::optional<std::string> of(const std::string& bytes) {
-    Examination examination;
-    if (Record::sax_parse(bytes, &examination, Record::input_format_t::cbor)) return std::nullopt;
-    return examination.complaint_;
-  }
+  std::string take() { return std::move(bytes_); }
 
-  bool null() override { return true; }
-  bool boolean(bool) override { return true; }
-  bool number_integer(number_integer_t) override { return true; }
-  bool number_unsigned(number_unsigned_t) override { return true; }
-  bool number_float(number_float_t, const string_t&) override { return true; }
-  bool string(string_t&) override { return true; }
-  bool binary(binary_t&) override { return true; }
-  bool key(string_t&) override { return true; }
-  bool start_object(std::size_t) override { return ++depth_ <= deepest; }
-  bool end_object() override { return --depth_, true; }
-  bool start_array(std::size_t) override { return ++depth_ <= deepest; }
-  bool end_array() override { return --depth_, true; }
-  bool parse_error(std::size_t, const std::string&, const Record::exception& error) override {
-    complaint_ = error.what();
-    return false;
+  void write(std::uint64_t value) { write_as_it_lies(value); }
+  void write(double value) { write_as_it_lies(value); }
+  void write(bool value) { write_as_it_lies(value); }
+  void write(EffectProof proof) { write_as_it_lies(proof); }
+  void write(const std::string& text) {
+    write(std::uint64_t{text.size()});
+    bytes_ += text;
+  }
+  template <class Value>
+  void write(const std::optional<Value>& value) {
+    write(value.has_value());
+    if (value) write(*value);
+  }
+  template <class First, class Second>
+  void write(const std::pair<First, Second>& pair) {
+    write(pair.first);
+    write(pair.second);
+  }
+  template <class Value>
+  void write(const std::vector<Value>& values) {
+    write(std::uint64_t{values.size()});
+    for (const Value& value : values) write(value);
+  }
+  template <class Value, std::size_t Size>
+  void write(const std::array<Value, Size>& values) {
+    for (const Value& value : values) write(value);
+  }
+  template <class Struct>
+  std::enable_if_t<std::is_class<Struct>::value> write(const Struct& value) {
+    each_member(value, [&](std::string_view, const auto& member) {
+      if constexpr (!stays<std::decay_t<decltype(member)>>) write(member);
+    });
   }
 
  private:
-  static constexpr unsigned deepest = 16;
-  unsigned depth_ = 0;
-  std::string complaint_ = "it goes deeper than a result";
+  template <class Value>
+  void write_as_it_lies(Value value) {
+    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+
+  std::string bytes_;
+};
+
+/// Takes no more memory than the bytes that are there justify.
+class ByteReader {
+ public:
+  explicit ByteReader(std::string_view bytes) : left_(bytes) {}
+  std::size_t left() const { return left_.size(); }
+
+  void read(std::uint64_t& value) { read_as_it_lies(value); }
+  void read(double& value) { read_as_it_lies(value); }
+  void read(bool& value) { value = read_up_to(1) != 0; }
+  void read(EffectProof& proof) {
+    proof = static_cast<EffectProof>(read_up_to(static_cast<std::uint8_t>(EffectProof::bounded)));
+  }
+  void read(std::string& text) {
+    std::uint64_t size = 0;
+    read(size);
+    text = next(size);
+  }
+  template <class Value>
+  void read(std::optional<Value>& value) {
+    bool is_there = false;
+    read(is_there);
+    if (is_there) read(value.emplace());
+  }
+  template <class First, class Second>
+  void read(std::pair<First, Second>& pair) {
+    read(pair.first);
+    read(pair.second);
+  }
+  template <class Value>
+  void read(std::vector<Value>& values) {
+    std::uint64_t size = 0;
+    for (read(size); size > 0; --size) read(values.emplace_back());
+  }
+  template <class Value, std::size_t Size>
+  void read(std::array<Value, Size>& values) {
+    for (Value& value : values) read(value);
+  }
+  template <class Struct>
+  std::enable_if_t<std::is_class<Struct>::value> read(Struct& value) {
+    each_member(value, [&](std::string_view, auto& member) {
+      if constexpr (!stays<std::decay_t<decltype(member)>>) read(member);
+    });
+  }
+
+ private:
+  std::string_view next(std::uint64_t size) {
+    if (size > left_.size()) refuse_record("it ends before it should");
+    const std::string_view bytes = left_.substr(0, size);
+    left_.remove_prefix(size);
+    return bytes;
+  }
+  template <class Value>
+  void read_as_it_lies(Value& value) {
+    std::memcpy(&value, next(sizeof value).data(), sizeof value);
+  }
+  std::uint8_t read_up_to(std::uint8_t most) {
+    std::uint8_t value = 0;
+    read_as_it_lies(value);
+    if (value > most) refuse_record("it has a value that there is not");
+    return value;
+  }
+
+  std::string_view left_;
 };
 
 }  // namespace
@@ -239,14 +322,18 @@ RunResult decode(const Record& json, const RunRequest& request) {
 }
 
 std::string to_bytes(const RunResult& result) {
-  std::string bytes;
-  Record::to_cbor(encode(result), bytes);
-  return bytes;
+  ByteWriter writer;
+  writer.write(result);
+  return writer.take();
 }
 
 RunResult from_bytes(const std::string& bytes, const RunRequest& request) {
-  if (const auto complaint = Examination::of(bytes)) refuse_record(*complaint);
-  return decode(Record::from_cbor(bytes), request);
+  RunResult result;
+  ByteReader reader(bytes);
+  reader.read(result);
+  if (reader.left() != 0) refuse_record("it has more than this version knows");
+  result.request = as_taken(request, result.way);
+  return result;
 }
 
 }  // namespace vrpipe::tools

@@ -15,7 +15,7 @@ nlohmann::json encode(const RunResult& result);
 /// @throws std::runtime_error for what encode() cannot have made
 RunResult decode(const nlohmann::json& json, const RunRequest& request);
 
-/// The same as CBOR (RFC 8949).
+/// The same for another process of this very program: values without names, which take less time.
 std::string to_bytes(const RunResult& result);
 /// @throws std::runtime_error for what to_bytes() cannot have made
 RunResult from_bytes(const std::string& bytes, const RunRequest& request);
