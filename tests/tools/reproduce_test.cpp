@@ -261,6 +261,13 @@ TEST_F(Synthetic, TheTextHeadsItsRows) {
   EXPECT_LT(heading, text.find("\nR1  differs             up to 2.78x             3.28x (truck), +18 %\n"));
 }
 
+TEST_F(Synthetic, ColumnsCanBeToldApart) {
+  for (const tools::ReportTable& table : tools::all_tables(tools::reproduction_of(result_))) {
+    const std::set<std::string> headings(table.heading.begin(), table.heading.end());
+    EXPECT_EQ(headings.size(), table.heading.size()) << table.title;
+  }
+}
+
 TEST_F(Synthetic, RowsThatCouldNotHaveFailedDoNotCount) {
   for (const char* id : {"R14", "R16", "R25", "R31", "R32"}) EXPECT_EQ(row(id).verdict, Verdict::input) << id;
   for (const char* id : {"R20", "R29", "R30", "C12"}) EXPECT_EQ(row(id).verdict, Verdict::cannot_fail) << id;
