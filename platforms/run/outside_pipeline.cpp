@@ -41,7 +41,7 @@ void check_has_no_pipeline(const RunRequest& request) {
 
 void check_own_changes(const Variant& variant) {
   const auto check = [&](const std::string& slot, const std::string& change) {
-    if (!is_outside_pipeline(slot) || draws_with(variant, slot)) return;
+    if (!is_without(variant, slot)) return;
     throw UserError("cannot change '" + change + "'", "variant " + variant.name, "it does not draw with " + slot,
                     "leave it out");
   };
@@ -156,6 +156,12 @@ bool draws_with(const Variant& variant, const std::string& slot) {
     case DrawnBy::accelerator: return slot == "accelerator";
   }
   return false;
+}
+
+bool is_without(const Variant& variant, const std::string& unit) {
+  const std::string slot = without_gpc(unit);
+  const bool is_known = Registry::instance().has_slot(slot) || unit.rfind("link.", 0) == 0;
+  return is_known && !draws_with(variant, slot);
 }
 
 void check_drawable(const RunRequest& request, const Frame& frame) {

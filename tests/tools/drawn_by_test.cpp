@@ -201,6 +201,16 @@ TEST_F(DrawnBy, WhatTheyAreWithoutIsRefused) {
     for (const char* variant : {"software", "accelerator"})
       bad({"run", "--variant", variant, "--unit", unit}, {unit, "no variant here draws with it"});
   }
+  for (const char* parameter : {"crop.ways", "gpc0.crop.ways", "link.draw.vertices.depth"}) {
+    const std::string setting = std::string(parameter) + "=4";
+    for (const char* variant : {"software", "accelerator"}) {
+      bad({"run", "--variant", variant, "--set", setting},
+          {std::string("--set ") + parameter, "no variant here draws with it"});
+    }
+    bad({"run", "--variant", "m=software," + setting}, {"variant m", parameter, "does not draw with"});
+  }
+  bad({"run", "--variant", "accelerator", "--set", "sm.cores=4"}, {"sm.cores", "no variant here"});
+  bad({"run", "--variant", "m=software,crop=in-shader"}, {"variant m", "does not draw with crop"});
   bad({"compare", "--variant", "baseline", "--variant", "m=software,accelerator=gcc"}, {"variant m", "accelerator"});
   bad({"compare", "--variant", "m=het,render=endless"}, {"'render'", "has none"});
   bad({"run", "--variant", "software", "--trace", "t.json"}, {"--trace", "variant software"});
@@ -214,6 +224,22 @@ TEST_F(DrawnBy, WhatTheyAreWithoutIsRefused) {
   bad({"run", "--variant", "accelerator", "--output", "o", "--heat-maps"}, {"--heat-maps", "does not tell"});
   write("frame.json", R"({"commands": [{"draw": "tiny.spl"}]})");
   refused({"run", "--frame", "frame.json", "--variant", "software"}, {"--frame", "variant software"});
+}
+
+TEST_F(DrawnBy, WhatOneOfThemHasCanBeSet) {
+  const auto run = [&](const std::string& variant, const std::vector<std::string>& settings) {
+    std::vector<std::string> arguments{"--variant", "software", "--variant", variant};
+    for (const std::string& setting : settings) arguments.insert(arguments.end(), {"--set", setting});
+    return by_variant(compared(arguments));
+  };
+  EXPECT_NE(run("het", {"crop.bytes_per_cycle=16"}).at("het")["cycles"], run("het", {}).at("het")["cycles"]);
+  EXPECT_NE(run("accelerator", {"sm.cores=4"}).at("software")["cycles"],
+            run("accelerator", {"platform.gpcs=1", "state.exponential=exact"}).at("software")["cycles"]);
+  // A printed configuration sets everything.
+  write("c.toml", "[set]\ncrop.ways = 4\nlink.draw.vertices.depth = 4\n");
+  command("run", {"--variant", "software", "--config", "c.toml"});
+  refused({"run", "--scene", "tiny.spl", "--variant", "software", "--config", "c.toml", "--set", "crop.ways=8"},
+          {"--set crop.ways", "no variant here draws with it"});
 }
 
 TEST_F(DrawnBy, ReportsAndPagesHaveRunsWithoutQuads) {

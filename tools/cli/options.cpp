@@ -117,22 +117,31 @@ void check_orthographic(const std::string& text) {
 /// Whether it draws with kernels, or by an accelerator.
 bool is_outside(const Variant& variant) { return !variant.is_of_pipeline(); }
 
-/// A unit of a slot with which no variant draws; a setting only if it is for kernels and accelerators: a configuration file
-/// may set everything.
-void refuse_unused(const RunRequest& request, const std::vector<Variant>& variants) {
+/// Whether a setting is from a configuration file.
+std::function<bool(const Setting&)> of_file(const Invocation& invocation) {
+  return [&invocation](const Setting& setting) {
+    return invocation.gives("--set " + setting.unit + "." + setting.parameter);
+  };
+}
+
+/// A unit with which no variant draws, and its settings. Those of the pipeline may be in a configuration file, which sets
+/// everything where it was printed.
+void refuse_unused(const RunRequest& request, const std::vector<Variant>& variants, const Invocation& invocation) {
+  const auto is_of_file = of_file(invocation);
   const bool draws_outside = std::any_of(variants.begin(), variants.end(), is_outside);
-  const auto check = [&](const std::string& option, const std::string& slot) {
-    const auto uses = [&](const Variant& variant) { return draws_with(variant, slot); };
-    if (std::any_of(variants.begin(), variants.end(), uses)) return;
-    throw UserError("cannot choose or set '" + slot + "'", option,
+  const auto check = [&](const std::string& option, const std::string& unit) {
+    const auto lacks = [&](const Variant& variant) { return is_without(variant, unit); };
+    if (!std::all_of(variants.begin(), variants.end(), lacks)) return;
+    throw UserError("cannot choose or set '" + unit + "'", option,
                     draws_outside ? "no variant here draws with it" : "it is no unit of a draw by hardware",
                     "leave it out, or take a variant that draws with it, or `vrpipe frames`");
   };
   for (const Setting& setting : request.settings) {
-    if (is_outside_pipeline(setting.unit)) check("--set " + setting.unit + "." + setting.parameter, setting.unit);
+    if (is_outside_pipeline(setting.unit) || !is_of_file(setting))
+      check("--set " + setting.unit + "." + setting.parameter, setting.unit);
   }
   for (const UnitChoice& choice : request.units)
-    check("--unit " + choice.slot + "=" + choice.implementation, without_gpc(choice.slot));
+    check("--unit " + choice.slot + "=" + choice.implementation, choice.slot);
 }
 
 /// A unit for all that no variant takes, after refuse_unused().
@@ -153,13 +162,6 @@ void refuse_overridden(const std::vector<UnitChoice>& units, const std::vector<V
                                 own.implementation),
                     "leave it out, or take another variant");
   }
-}
-
-/// Whether a setting is from a configuration file.
-std::function<bool(const Setting&)> of_file(const Invocation& invocation) {
-  return [&invocation](const Setting& setting) {
-    return invocation.gives("--set " + setting.unit + "." + setting.parameter);
-  };
 }
 
 }  // namespace
@@ -652,9 +654,10 @@ std::vector<Variant> SimulationArguments::variants_drawn_by(const SimulationJob&
 }
 
 /// Of variants that draw outside the pipeline, what there is not.
-void SimulationArguments::check_outside(const SimulationJob& job, const std::vector<Variant>& variants) const {
+void SimulationArguments::check_outside(const SimulationJob& job, const std::vector<Variant>& variants,
+                                        const Invocation& invocation) const {
   if (takes_kernels_) return;
-  refuse_unused(job.requests.front(), variants);
+  refuse_unused(job.requests.front(), variants, invocation);
   const auto found = std::find_if(variants.begin(), variants.end(), is_outside);
   if (found == variants.end()) return;
   const auto refuse = [&](bool is_given, const char* option, const std::string& why) {
@@ -725,7 +728,7 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
 
   job.requests = requests(request, variants);
   const std::vector<Variant> drawn = variants_drawn_by(job, of_study);
-  check_outside(job, drawn);
+  check_outside(job, drawn, invocation);
   refuse_overridden(job.requests.front().units, drawn);
   leave_out_restated(job.requests, of_file(invocation));
   for (RunRequest& each : job.requests) {
@@ -768,7 +771,7 @@ MachineJob SimulationArguments::resolve_machine(const Invocation& invocation, co
   job.request.variant = variant_named("baseline");
   if (job.request.sampling)
     throw UserError("cannot be sampled", "--fidelity", "a microbenchmark is short", "use lt or cycle");
-  refuse_unused(job.request, {job.request.variant});
+  refuse_unused(job.request, {job.request.variant}, invocation);
   std::vector<RunRequest> requests{job.request};
   leave_out_restated(requests, of_file(invocation));
   job.request = requests.front();

@@ -83,7 +83,8 @@ class SimulationArguments {
   FrameDescription frame() const;
   std::vector<NamedFile> inputs(const FrameDescription& frame) const;
   static std::vector<Variant> variants_drawn_by(const SimulationJob& job, const std::vector<std::string>& of_study);
-  void check_outside(const SimulationJob& job, const std::vector<Variant>& variants) const;
+  void check_outside(const SimulationJob& job, const std::vector<Variant>& variants,
+                     const Invocation& invocation) const;
   void check_explanation(const EffectChoice& effects) const;
   void choose_error(RunRequest& request) const;
   /// Null if energy is not asked for; throws UserError.

@@ -39,6 +39,8 @@ bool is_outside_pipeline(const std::string& unit);
 RunRequest of_pipeline_alone(RunRequest request);
 /// Whether a variant draws with a unit of this slot.
 bool draws_with(const Variant& variant, const std::string& slot);
+/// Whether a unit or link, `gpc0.crop` as well, is known and is none of those that a variant draws with.
+bool is_without(const Variant& variant, const std::string& unit);
 /// Throws UserError for a frame that the variant of a request cannot draw: outside the pipeline one plain draw of splats is all.
 void check_drawable(const RunRequest& request, const Frame& frame);
 /// The request without its settings and units for kernels and accelerators that its variant does not draw with.
