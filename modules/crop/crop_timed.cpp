@@ -52,7 +52,7 @@ class TimedCrop : public TimedUnit {
         second_looks_(time_.most_in_a_cycle),
         ahead_(std::max(time_.fetch_ahead_quads, 1U)),
         queue_(time_.input_quads),
-        stays_(time_.cache.lines()) {
+        last_blend_of_(time_.cache.lines()) {
     out_.set_pipeline(time_.latency_cycles - 1, ColorBeat::in_a_cycle(time_.blend_rate));
     out_done_.set_pipeline(time_.latency_cycles - 1);
     out_done_.set_optional();
@@ -67,12 +67,6 @@ class TimedCrop : public TimedUnit {
   Cycle end_of_frame() const override { return end_; }
 
  private:
-  /// What a line of the cache holds.
-  struct Stay {
-    Cycle last_blend = 0;     ///< of a quad that needed it, or what it held before
-    std::uint32_t dirty = 0;  ///< sectors, where they take flits
-  };
-
   void end_of_elaboration() override {
     const ColorSurface* const surface = behaviour_->surface();
     if (surface == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
@@ -128,7 +122,7 @@ class TimedCrop : public TimedUnit {
     }
     behaviour_->look_up(warp, from, to, cache_);
     for (unsigned line = 0; line < cache_.count && !fetches_ahead; ++line) {
-      if (cache_.lines[line].replaced) at = std::max(at, stays_[cache_.lines[line].line].last_blend);
+      if (cache_.lines[line].replaced) at = std::max(at, last_blend_of_[cache_.lines[line].line]);
     }
     CycleInterval looked_up = look_ups_.take(port_open_from(at), quads);
     looked_up.last = std::max(looked_up.last, has_places);
@@ -217,12 +211,12 @@ class TimedCrop : public TimedUnit {
     if (parts > 0) did(CropWork::unpaired, static_cast<std::uint64_t>(parts), at);
   }
   /// From when on the port takes more, by what was sent before: lines are written back when quads are blended, which is long
-  /// after the look-ups of those behind them. Blending did not wait for what it made dirty and which is not sent yet.
+  /// after the look-ups of those behind them.
   Cycle port_open_from(Cycle at) {
     while (true) {
       for (; !sent_.empty() && sent_.front().at <= at; sent_.pop())
         sent_before_.take(sent_.front().flits, sent_.front().at);
-      const Cycle open = sent_before_.open_from(at, owed_);
+      const Cycle open = sent_before_.open_from(at);
       if (open == at) return at;
       at = open;
     }
@@ -236,17 +230,14 @@ class TimedCrop : public TimedUnit {
 
   /// Moves what a look-up says of a line; returns when its sectors are there.
   Cycle move(const CropBehaviour::LineAccess& access, bool fetches_ahead, Cycle& at) {
-    Stay& stay = stays_[access.line];
     if (access.written_back != 0) {
       // Where tags run ahead, quads may still be blended into what the line held.
-      const Cycle from = fetches_ahead ? std::max(at, stay.last_blend) : at;
+      const Cycle from = fetches_ahead ? std::max(at, last_blend_of_[access.line]) : at;
       memory_.write_back(access, from);
       CropTime::Moves moves;
       moves.write(static_cast<unsigned>(__builtin_popcount(access.written_back)));
       if (time_.port.is_on()) {
         send(moves.flits, from);
-        owed_ -= moves.flits;
-        stay.dirty = 0;
       }
     }
     // What replaces colours does not read them.
@@ -272,7 +263,7 @@ class TimedCrop : public TimedUnit {
       LineAccess again;
       again.address = line.address;
       again.filled = look.again;
-      there = memory_.fill(again, at);
+      there = memory_.fill_at_once(again, at);
     }
     second_looks_.hold(at);
     ahead_.take(1, at + 1);  // second looks come after what arrives in their cycle
@@ -302,20 +293,12 @@ class TimedCrop : public TimedUnit {
     }
     for (unsigned i = 0; i < cache_.count; ++i) {
       const std::uint32_t line = cache_.lines[i].line;
-      stays_[line].last_blend = at.last;
+      last_blend_of_[line] = at.last;
       if (fetches_ahead)
         uses_of(cache_.lines[i]).used(sectors_of(warp, from).sectors, time_.cache.sectors_of_a_half(), at.last);
       if (dirty[i] == 0) continue;
       behaviour_->make_dirty(line, dirty[i]);
-      if (time_.port.is_on()) owe(stays_[line], dirty[i]);
     }
-  }
-
-  /// Flits of what is dirty now.
-  void owe(Stay& stay, std::uint32_t dirty) {
-    owed_ += CropTime::flits_of_writes(stay.dirty == 0 ? 1 : 0,
-                                       static_cast<unsigned>(__builtin_popcount(dirty & ~stay.dirty)));
-    stay.dirty |= dirty;
   }
 
   void signal(const ShadedWarp& warp, unsigned from, unsigned to, const CropBehaviour::Outcomes& outcomes,
@@ -360,9 +343,8 @@ class TimedCrop : public TimedUnit {
     Cycle at = 0;
     unsigned flits = 0;
   };
-  Ring<Sent> sent_;         ///< to the port, later than the last look-up
-  FlitPort sent_before_;    ///< what was sent before it
-  std::uint64_t owed_ = 0;  ///< flits of lines that are dirty
+  Ring<Sent> sent_;       ///< to the port, later than the last look-up
+  FlitPort sent_before_;  ///< what was sent before it
   const BarrierPlan barriers_;
   EffectGate hazard_gate_;
   const unsigned at_once_;  ///< quads looked up before the first of them is blended
@@ -371,11 +353,11 @@ class TimedCrop : public TimedUnit {
   CropBehaviour::CacheLookUp cache_;
   ThroughputPort look_ups_;
   ThroughputPort second_looks_;
-  SlotPool ahead_;    ///< quads between the first look at their tags and the second, if there are two
-  SlotPool queue_;    ///< quads between look-up and blending
-  Ring<Move> moves_;  ///< that the blender has not given its time to yet
-  std::vector<Stay> stays_;
-  std::vector<TimedLineUses> uses_;  ///< by line of the surface, where tags are looked at twice
+  SlotPool ahead_;                    ///< quads between the first look at their tags and the second, if there are two
+  SlotPool queue_;                    ///< quads between look-up and blending
+  Ring<Move> moves_;                  ///< that the blender has not given its time to yet
+  std::vector<Cycle> last_blend_of_;  ///< by line of the cache: of a quad that needed it, or what it held before
+  std::vector<TimedLineUses> uses_;   ///< by line of the surface, where tags are looked at twice
   VisitCounter visits_;
   SectoredCache* pinned_cache_ = nullptr;  ///< where lines of queued quads are pinned
   TimedPins pins_;

@@ -17,11 +17,10 @@ class FlitPort {
   FlitPort(unsigned per_cycle, std::uint32_t backlog) : per_cycle_(per_cycle), backlog_(backlog) {}
   bool is_on() const { return per_cycle_ > 0; }
   double cycles_of_a_flit() const { return is_on() ? 1.0 / static_cast<double>(per_cycle_) : 0; }
-  /// The first cycle from one on in which its backlog takes more; `room` for so many flits more than it has.
-  Cycle open_from(Cycle cycle, std::uint64_t room = 0) const {
-    room += backlog_;
-    if (done_ <= cycle * per_cycle_ + room) return cycle;
-    return (done_ - room + per_cycle_ - 1) / per_cycle_;
+  /// The first cycle from one on in which its backlog takes more.
+  Cycle open_from(Cycle cycle) const {
+    if (done_ <= cycle * per_cycle_ + backlog_) return cycle;
+    return (done_ - backlog_ + per_cycle_ - 1) / per_cycle_;
   }
   /// Takes so many from a cycle on, whatever waits. Returns when they begin to go, and when the last has gone.
   std::pair<Cycle, Cycle> take(unsigned flits, Cycle at) {

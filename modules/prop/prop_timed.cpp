@@ -80,16 +80,16 @@ class TimedProp : public TimedUnit {
   CycleInterval forward(unsigned work, const BinItem& item, CycleInterval visible, Passage& passage,
                         TimedOut<BinItem>& out) {
     const unsigned width = passage.width.of(item.quads, item.beats);
+    const unsigned beats = std::max({item.beats, (item.quads + width - 1) / width, 1U});
     const Cycle free_from = std::max(out.last(), out.room_from());
     CycleInterval at;
-    unsigned beat = 0;
-    unsigned quads = item.quads;
-    do {
-      const unsigned beats_quads = std::max(std::min(width, quads), 1U);
-      quads -= std::min(beats_quads, quads);
-      at.last = passage.limit.take(beats_quads, std::max(visible.of_part(beat, item.beats), free_from));
+    unsigned left = item.quads;
+    for (unsigned beat = 0; beat < beats; ++beat) {
+      const unsigned quads = std::min(width, left);
+      left -= quads;
+      at.last = passage.limit.take(std::max(quads, 1U), std::max(visible.of_part(beat, beats), free_from));
       if (beat == 0) at.first = at.last;
-    } while (++beat < item.beats);
+    }
     const CycleInterval taken = out.send(item, at, item.beats);
     passage.limit.hold(taken.last);
     did(work, item.quads, taken.last);

@@ -5,6 +5,7 @@
 #include <vrpipe/component/error.h>
 #include <vrpipe/platforms/stress.h>
 #include <vrpipe/platforms/validated_range.h>
+#include <vrpipe/workloads/scene.h>
 
 #include "support/simulate.h"
 
@@ -203,6 +204,32 @@ TEST(Stress, AFarCropHasPlacesForAllBeatsOfACycle) {
             r.settings = {{"prop", "color_bytes_per_cycle", "128"}, {"link.prop.color", "latency_cycles", "900"}};
           }),
       random_draw(96, 96, 1500, 8), 0.03);
+}
+
+/// Half of the addresses are near to L2; second looks ask without registers.
+TEST(Stress, FewFillsAtATimeComeBackInAnyOrder) {
+  for (const ColorFormat format : {ColorFormat::rgba16f, ColorFormat::rgba32f}) {
+    expect_lt_is_near(on("gh100-gpc", request_of("baseline", Fidelity::cycle,
+                                                 [&](RunRequest& r) {
+                                                   r.format = format;
+                                                   r.settings = {{"crop", "mshrs", "48"}};
+                                                 })),
+                      random_draw(160, 120, 1500, 8), 0.015);
+  }
+}
+
+TEST(Stress, LooksWaitForThePortOfAColourCacheThatWritesLongLines) {
+  SceneRequest scene;
+  scene.scene = "builtin:train";
+  scene.size = ImageSize{64, 64};
+  scene.fovy_degrees = 4;
+  expect_lt_is_near(on("agx-orin-ideal-memory", request_of("het", Fidelity::cycle,
+                                                           [](RunRequest& r) {
+                                                             r.format = ColorFormat::rgba32f;
+                                                             r.termination = Termination::strict;
+                                                             r.settings = {{"crop", "port_flits_per_cycle", "1"}};
+                                                           })),
+                    load_scene(scene).draw, 0.015);
 }
 
 TEST(Stress, LongVertexShadersWaitForFragmentsAndFragmentsForThem) {

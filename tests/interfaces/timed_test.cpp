@@ -249,6 +249,24 @@ TEST(ThroughputPort, PartsOfAnItemMayGoInNeighbouringCycles) {
   EXPECT_EQ(taken(50, 0), (std::pair<Cycle, Cycle>(50, 50))) << "nothing takes nothing";
 }
 
+TEST(SlotPool, PlacesAreFreeWhenTheirTimeIsOver) {
+  SlotPool pool(4);
+  pool.take(2, 100);
+  pool.take(2, 100);
+  EXPECT_EQ(pool.free_from(50, 1), 100U);
+  EXPECT_EQ(pool.free_from(150, 4), 150U);
+  pool.take(4, {200, 206});
+  EXPECT_EQ(pool.free_from(150, 2), 202U) << "those of one item one after the other";
+}
+
+TEST(SlotPool, WhatIsTakenLaterMayBeFreeEarlier) {
+  SlotPool pool(2);
+  pool.take(1, 433);
+  pool.take(1, 242);
+  EXPECT_EQ(pool.free_from(10, 1), 242U);
+  EXPECT_EQ(pool.free_from(10, 2), 433U);
+}
+
 TEST(CycleInterval, SpreadsPartsEvenly) {
   const CycleInterval dense(10, 13);
   EXPECT_EQ(dense.of_part(0, 4), 10U);

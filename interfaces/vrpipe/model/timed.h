@@ -113,7 +113,7 @@ class ThroughputPort {
   Cycle cycle_ = 0;
 };
 
-/// So many places, each taken until a cycle that is known, and freed in the order in which they were taken.
+/// So many places, each taken until a cycle that is known.
 class SlotPool {
  public:
   explicit SlotPool(unsigned places) : free_(places) {}
@@ -122,25 +122,26 @@ class SlotPool {
     for (; free_ < places; taken_.pop()) {
       const Taken& next = taken_.front();
       if (const auto lacking = static_cast<unsigned>(places - free_); lacking < next.places)
-        return std::max(at, next.until.of_part(lacking - 1, next.places));
+        return std::max(at, CycleInterval(next.first, next.last).of_part(lacking - 1, next.places));
       free_ += next.places;
-      at = std::max(at, next.until.last);
+      at = std::max(at, next.last);
     }
     return at;
   }
   /// Takes them, which `free_from` has said are free, until cycles that are spread over an interval.
   void take(unsigned places, CycleInterval until) {
     free_ -= places;
-    taken_.push({places, until});
+    taken_.push_in_order({places, until.first, until.last}, &Taken::last);
   }
 
  private:
   struct Taken {
     unsigned places = 0;
-    CycleInterval until;
+    Cycle first = 0;
+    Cycle last = 0;
   };
   std::int64_t free_;  ///< less those of `taken_` that are free already
-  Ring<Taken> taken_;
+  Ring<Taken> taken_;  ///< in the order in which they are free
 };
 
 class TimedUnit : public Unit {

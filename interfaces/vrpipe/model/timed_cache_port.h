@@ -45,6 +45,16 @@ class TimedCachePort {
   Cycle fill(const LineAccess& access, Cycle& at) {
     return fill(access, at, [](unsigned, unsigned, Cycle) {});
   }
+  /// The same for sectors that are asked for without waiting for a register, in a cycle that may be later than those of the next.
+  Cycle fill_at_once(const LineAccess& access, Cycle at) {
+    Cycle there = 0;
+    for_each_sector_run(access.filled, longest_run_, [&](unsigned sector, unsigned sectors) {
+      there = memory_.read(access.address + (std::uint64_t{sector} << sector_shift_), sectors << sector_shift_, at);
+      fills_.ask(sectors, at, there);
+      sectors_moved_ += sectors;
+    });
+    return there;
+  }
   /// Writes the dirty sectors of an evicted line back.
   void write_back(const LineAccess& access, Cycle at) {
     for_each_sector_run(access.written_back, longest_run_, [&](unsigned sector, unsigned sectors) {
