@@ -236,9 +236,7 @@ class TimedCrop : public TimedUnit {
       memory_.write_back(access, from);
       CropTime::Moves moves;
       moves.write(static_cast<unsigned>(__builtin_popcount(access.written_back)));
-      if (time_.port.is_on()) {
-        send(moves.flits, from);
-      }
+      send(moves.flits, from);
     }
     // What replaces colours does not read them.
     if (fetches_ahead && access.replaced) uses_of(access).come(at, access.filled != 0);
@@ -296,8 +294,7 @@ class TimedCrop : public TimedUnit {
       last_blend_of_[line] = at.last;
       if (fetches_ahead)
         uses_of(cache_.lines[i]).used(sectors_of(warp, from).sectors, time_.cache.sectors_of_a_half(), at.last);
-      if (dirty[i] == 0) continue;
-      behaviour_->make_dirty(line, dirty[i]);
+      if (dirty[i] != 0) behaviour_->make_dirty(line, dirty[i]);
     }
   }
 

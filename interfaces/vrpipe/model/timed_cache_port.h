@@ -34,10 +34,8 @@ class TimedCachePort {
     Cycle there = 0;
     for_each_sector_run(access.filled, longest_run_, [&](unsigned sector, unsigned sectors) {
       at = mshrs_.free_from(at, sectors);
-      there = memory_.read(access.address + (std::uint64_t{sector} << sector_shift_), sectors << sector_shift_, at);
-      fills_.ask(sectors, at, there);
+      there = ask(access.address, sector, sectors, at);
       mshrs_.take(sectors, there);
-      sectors_moved_ += sectors;
       filled(sector, sectors, there);
     });
     return there;
@@ -45,14 +43,11 @@ class TimedCachePort {
   Cycle fill(const LineAccess& access, Cycle& at) {
     return fill(access, at, [](unsigned, unsigned, Cycle) {});
   }
-  /// The same for sectors that are asked for without waiting for a register, in a cycle that may be later than those of the next.
+  /// The same without registers, in a cycle that may be later than those of the next.
   Cycle fill_at_once(const LineAccess& access, Cycle at) {
     Cycle there = 0;
-    for_each_sector_run(access.filled, longest_run_, [&](unsigned sector, unsigned sectors) {
-      there = memory_.read(access.address + (std::uint64_t{sector} << sector_shift_), sectors << sector_shift_, at);
-      fills_.ask(sectors, at, there);
-      sectors_moved_ += sectors;
-    });
+    for_each_sector_run(access.filled, longest_run_,
+                        [&](unsigned sector, unsigned sectors) { there = ask(access.address, sector, sectors, at); });
     return there;
   }
   /// Writes the dirty sectors of an evicted line back.
@@ -66,6 +61,13 @@ class TimedCachePort {
   unsigned take_moved() { return std::exchange(sectors_moved_, 0); }
 
  private:
+  Cycle ask(std::uint64_t line, unsigned sector, unsigned sectors, Cycle at) {
+    const Cycle there = memory_.read(line + (std::uint64_t{sector} << sector_shift_), sectors << sector_shift_, at);
+    fills_.ask(sectors, at, there);
+    sectors_moved_ += sectors;
+    return there;
+  }
+
   TimedMemoryPort memory_;
   AnnotatedFillCounter fills_;
   SlotPool mshrs_;
