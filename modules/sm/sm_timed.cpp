@@ -8,6 +8,7 @@
 
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/model/timed.h>
+#include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/slots/sm.h>
 
 namespace vrpipe {
@@ -50,6 +51,7 @@ class TimedSm : public TimedUnit {
         schedulers_(time_.schedulers()),
         free_of_core_(time_.cores, time_.warps_per_core),
         vertex_slots_(time_.vertex_warps, 0),
+        barriers_(context),
         vertices_wait_(context.placement.gpcs == 1) {
     fragment_.for_each([&](const Program& each) { waiting_.resize(std::max(waiting_.size(), each.size())); });
     if (!EffectGate(context, "cache.details").is_active()) l1_statistics_.leave_out_details();
@@ -328,8 +330,7 @@ class TimedSm : public TimedUnit {
     vertices_launch_from_ = warp.mark == Mark::end_of_frame ? never : next_vertex_launch_;
     vertex_turn_ = next_of(vertex_turn_);
     vertices_.push({warp, launch, 0});
-    // A mark may be waited for.
-    while (!vertices_.empty() && (warp.mark != Mark::none || !vertices_wait_)) hand_on_vertices();
+    while (!vertices_.empty() && (barriers_.is_barrier(warp.mark) || !vertices_wait_)) hand_on_vertices();
     if (vertices_.size() == 1) clock.domain->wake(clock.unit, std::max(launch, now + 1));
     return launch;
   }
@@ -444,7 +445,8 @@ class TimedSm : public TimedUnit {
   Ring<VertexFlight> vertices_;  ///< in order, from the first slot to this turn's
   std::size_t shaded_ = 0;       ///< of these, from the first on
   std::size_t written_ = 0;
-  const bool vertices_wait_;  ///< to be handed on; across GPCs what comes behind them follows the order of calls
+  const BarrierPlan barriers_;  ///< DRAW waits for them
+  const bool vertices_wait_;    ///< to be handed on; across GPCs what comes behind them follows the order of calls
   std::uint64_t vertex_scheduler_ = 0;
   Cycle next_vertex_launch_ = 0;
   Cycle vertices_launch_from_ = 0;  ///< the same while any are to come

@@ -27,12 +27,14 @@ class TimedScheduler {
     return begin;
   }
 
-  /// The same of something that others which were told already should have waited for: those that come next do instead.
+  /// The same of something that is late: others that were told already, but are ready later, should have waited for it. Unless a
+  /// gap has its size those that come next do instead.
   Cycle put_late(Cycle ready, Cycle cycles) {
     Cycle begin = std::max(ready, forgotten_until_);
-    for (std::size_t i = 0; i < issues_.size() && issues_[i].ready <= ready; ++i)
-      begin = std::max(begin, issues_[i].end);
-    put(issues_.empty() ? ready : std::max(ready, issues_.back().ready), cycles, 0);
+    std::size_t next = 0;
+    for (; next < issues_.size() && issues_[next].ready <= ready; ++next) begin = std::max(begin, issues_[next].end);
+    const bool fits = next == issues_.size() || issues_[next].begin >= begin + cycles;
+    put(fits ? ready : issues_.back().ready, cycles, 0);
     return begin;
   }
 

@@ -62,9 +62,17 @@ TEST(TimedScheduler, WhoIsLateGetsHisTurnAndThoseWhoComeNextPayForIt) {
   TimedScheduler scheduler;
   scheduler.put(10, 5, 0);
   scheduler.put(100, 5, 0);
-  EXPECT_EQ(scheduler.put_late(12, 20), 15U);
-  EXPECT_EQ(scheduler.put(101, 1, 0), 125U);
+  EXPECT_EQ(scheduler.put_late(12, 90), 15U);
+  EXPECT_EQ(scheduler.put(101, 1, 0), 195U);
   EXPECT_EQ(scheduler.put_late(400, 20), 400U) << "not late at all";
+}
+
+TEST(TimedScheduler, WhoIsLateTakesAGapOfHisSize) {
+  TimedScheduler scheduler;
+  scheduler.put(10, 5, 0);
+  scheduler.put(100, 5, 0);
+  EXPECT_EQ(scheduler.put_late(12, 85), 15U);
+  EXPECT_EQ(scheduler.put(101, 1, 0), 105U);
 }
 
 TEST(TimedScheduler, IsFirstComeFirstServedWhateverTheOrderOfCalls) {
