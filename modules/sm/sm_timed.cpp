@@ -50,7 +50,7 @@ class TimedSm : public TimedUnit {
         hand_over_(time_, context),
         schedulers_(time_.schedulers()),
         free_of_core_(time_.cores, time_.warps_per_core),
-        vertex_slots_(time_.vertex_warps, 0),
+        vertex_slots_(time_.vertex_warps),
         barriers_(context),
         vertices_wait_(context.placement.gpcs == 1) {
     fragment_.for_each([&](const Program& each) { waiting_.resize(std::max(waiting_.size(), each.size())); });
@@ -255,7 +255,7 @@ class TimedSm : public TimedUnit {
     const Cycle cycles = segment.all() * cycles_per_instruction_;
     TimedScheduler& issues = schedulers_[scheduler];
     const Cycle begin =
-        roomy_ ? issues.append(from, cycles) : issues.put(from, cycles, std::min(from, vertices_launch_from_));
+        roomy_ ? issues.append(from, cycles) : issues.put(from, cycles, std::min(from, next_vertex_launch_));
     const Cycle merge = begin + segment.instructions * cycles_per_instruction_;
     const Cycle end = begin + cycles;
     frame_lasts(end);  // the warp's quads end after that
@@ -325,10 +325,10 @@ class TimedSm : public TimedUnit {
     const Cycle now = clock.domain->now();
     while (next_vertex_event() <= now) do_vertex_event();
     if (vertices_.size() == time_.vertex_warps) hand_on_vertices();
-    const Cycle launch = std::max({visible, next_vertex_launch_, vertex_slots_[vertex_turn_]});
-    next_vertex_launch_ = launch + 1;
-    vertices_launch_from_ = warp.mark == Mark::end_of_frame ? never : next_vertex_launch_;
-    vertex_turn_ = next_of(vertex_turn_);
+    // Those that have not been handed on keep theirs.
+    const auto places = static_cast<unsigned>(vertices_.size() + 1);
+    const Cycle launch = vertex_slots_.free_from(std::max(visible, next_vertex_launch_), places);
+    next_vertex_launch_ = warp.mark == Mark::end_of_frame ? never : launch + 1;
     vertices_.push({warp, launch, 0});
     while (!vertices_.empty() && (barriers_.is_barrier(warp.mark) || !vertices_wait_)) hand_on_vertices();
     if (vertices_.size() == 1) clock.domain->wake(clock.unit, std::max(launch, now + 1));
@@ -395,11 +395,7 @@ class TimedSm : public TimedUnit {
     --shaded_;
     --written_;
     vertices_done_ = std::max(vertices_done_, flight.at);
-    vertex_slots_[first_vertex_slot_] = out_vertices_.send(flight.warp, vertices_done_).first + 1;
-    first_vertex_slot_ = next_of(first_vertex_slot_);
-  }
-  std::uint32_t next_of(std::uint32_t vertex_slot) const {
-    return vertex_slot + 1 == time_.vertex_warps ? 0 : vertex_slot + 1;
+    vertex_slots_.take(1, out_vertices_.send(flight.warp, vertices_done_).first + 1);
   }
 
   Cycle free(const WarpRelease& release, Cycle visible) {
@@ -438,18 +434,15 @@ class TimedSm : public TimedUnit {
   };
   Ring<Release> releases_;  ///< of slots for fragment warps, by cycle, that no launch has come after yet
   std::vector<std::uint32_t> free_of_core_;
-  std::uint32_t free_slots_ = 0;     ///< of all cores
-  std::vector<Cycle> vertex_slots_;  ///< a ring
-  std::uint32_t vertex_turn_ = 0;
-  std::uint32_t first_vertex_slot_ = 0;
-  Ring<VertexFlight> vertices_;  ///< in order, from the first slot to this turn's
-  std::size_t shaded_ = 0;       ///< of these, from the first on
+  std::uint32_t free_slots_ = 0;  ///< of all cores
+  SlotPool vertex_slots_;         ///< of those that have been handed on
+  Ring<VertexFlight> vertices_;   ///< that have not, in order
+  std::size_t shaded_ = 0;        ///< of these, from the first on
   std::size_t written_ = 0;
   const BarrierPlan barriers_;  ///< DRAW waits for them
   const bool vertices_wait_;    ///< to be handed on; across GPCs what comes behind them follows the order of calls
   std::uint64_t vertex_scheduler_ = 0;
-  Cycle next_vertex_launch_ = 0;
-  Cycle vertices_launch_from_ = 0;  ///< the same while any are to come
+  Cycle next_vertex_launch_ = 0;  ///< or later; `never` behind the end of the frame
   Cycle vertices_done_ = 0;
   Cycle next_launch_ = 0;
   Cycle last_done_ = 0;

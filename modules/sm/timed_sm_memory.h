@@ -118,7 +118,6 @@ class TimedSmMemory {
   Cycle ask(L1& l1, std::uint64_t line, std::uint32_t& missing, SectorRun& run, Cycle& at) {
     run = take_sector_run(missing, std::min(sectors_of_a_line, timing_.l1_mshrs));
     at = l1.mshrs.free_from(at, run.count);
-    // Addresses of writes increase.
     const Cycle there = port_.access(traffic_.read(reads_.traffic, line, run), at);
     l1.mshrs.take(run.count, there);
     return there;

@@ -140,37 +140,35 @@ TEST(ExpectedError, IsLargeWhereRequestsWaitForOneAnotherInMemory) {
   EXPECT_EQ(slow.expected_error_percent, 10);
 }
 
+void expect_lt_is_near(RunRequest request, const Draw& draw, double tolerance) {
+  const auto cycles = static_cast<double>(*run(request, draw).cycles);
+  request.fidelity = Fidelity::lt;
+  EXPECT_NEAR(static_cast<double>(*run(request, draw).cycles) / cycles, 1, tolerance);
+}
+
 /// A unit's slots are full, and the next core has none either: all warps of a tile to one core.
 TEST(Stress, FewTilesOnOneCoreWaitForTheSlotsOfThatCore) {
   const Draw draw = random_draw(17, 33, 200, 3);
   for (const char* variant : {"baseline", "qm"}) {
-    RunRequest request = request_of(variant, Fidelity::cycle, [](RunRequest& r) {
-      r.platform = &platform_named("desktop");
-      r.settings = {{"sm", "warps_to_one_core", "256"}};
-    });
-    const auto cycles = static_cast<double>(*run(request, draw).cycles);
-    request.fidelity = Fidelity::lt;
-    EXPECT_NEAR(static_cast<double>(*run(request, draw).cycles) / cycles, 1, 0.05) << variant;
+    SCOPED_TRACE(variant);
+    expect_lt_is_near(request_of(variant, Fidelity::cycle,
+                                 [](RunRequest& r) {
+                                   r.platform = &platform_named("desktop");
+                                   r.settings = {{"sm", "warps_to_one_core", "256"}};
+                                 }),
+                      draw, 0.05);
   }
 }
 
 /// Few places under way and a long way to memory.
 TEST(Stress, AFarMemoryAndBinsOfOneQuadDoNotDelayFills) {
-  const Draw draw = random_draw(48, 32, 300, 4);
-  RunRequest request = request_of("het+qm", Fidelity::cycle, [](RunRequest& r) {
-    r.settings = {{"l2", "latency_cycles", "20000"},
-                  {"tc", "bin_quads", "1"},
-                  {"state", "termination_threshold", "1e-9"}};
-  });
-  const auto cycles = static_cast<double>(*run(request, draw).cycles);
-  request.fidelity = Fidelity::lt;
-  EXPECT_NEAR(static_cast<double>(*run(request, draw).cycles) / cycles, 1, 0.05);
-}
-
-void expect_lt_is_near(RunRequest request, const Draw& draw, double tolerance) {
-  const auto cycles = static_cast<double>(*run(request, draw).cycles);
-  request.fidelity = Fidelity::lt;
-  EXPECT_NEAR(static_cast<double>(*run(request, draw).cycles) / cycles, 1, tolerance);
+  expect_lt_is_near(request_of("het+qm", Fidelity::cycle,
+                               [](RunRequest& r) {
+                                 r.settings = {{"l2", "latency_cycles", "20000"},
+                                               {"tc", "bin_quads", "1"},
+                                               {"state", "termination_threshold", "1e-9"}};
+                               }),
+                    random_draw(48, 32, 300, 4), 0.05);
 }
 
 /// Fewer than CROP blends in a cycle would otherwise signal alone, each after as long a way.
