@@ -11,6 +11,7 @@
 
 #include <vrpipe/arithmetic/divisor.h>
 #include <vrpipe/kernel/accounting.h>
+#include <vrpipe/kernel/pipeline_stages.h>
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/pipeline/quad_sectors.h>
@@ -182,6 +183,11 @@ class CropTime {
                           const CropBehaviour::CacheLookUp& looked_up, const ColorSurface& surface);
   /// The least that it takes: the resource that has most to do.
   double least_cycles(const Sum& sum) const;
+  /// Of signals of termination, beats of them, and of what says that a barrier's blends are done.
+  PipelineStages of_terminations() const {
+    return PipelineStages::of_latency(latency_cycles, ColorBeat::in_a_cycle(blend_rate));
+  }
+  PipelineStages of_barriers() const { return PipelineStages::of_latency(latency_cycles); }
   /// The slot's kinds of work.
   std::vector<WorkKind> kinds() const;
   /// Quads of a warp that are looked up before the first of them is blended, where a warp is taken in one piece. Where places

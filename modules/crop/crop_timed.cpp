@@ -53,8 +53,8 @@ class TimedCrop : public TimedUnit {
         ahead_(std::max(time_.fetch_ahead_quads, 1U)),
         queue_(time_.input_quads),
         last_blend_of_(time_.cache.lines()) {
-    out_.set_pipeline(time_.latency_cycles - 1, ColorBeat::in_a_cycle(time_.blend_rate));
-    out_done_.set_pipeline(time_.latency_cycles - 1);
+    out_.set_pipeline(time_.of_terminations());
+    out_done_.set_pipeline(time_.of_barriers());
     out_done_.set_optional();
     in_reads_.set_optional();
     in_reads_.set_comes_ahead();

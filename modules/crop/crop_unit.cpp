@@ -41,8 +41,8 @@ class CropUnit : public Unit {
         hazard_gate_(context, "crop.blend_hazard"),
         cache_order_gate_(context, "crop.cache_order"),
         port_(*this, "memory", time_.mshrs, {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {
-    out_.set_pipeline(time_.latency_cycles - 1, ColorBeat::in_a_cycle(time_.blend_rate));
-    out_done_.set_pipeline(time_.latency_cycles - 1);
+    out_.set_pipeline(time_.of_terminations());
+    out_done_.set_pipeline(time_.of_barriers());
     out_done_.set_optional();
     in_reads_.set_optional();
     in_reads_.set_comes_ahead();

@@ -5,6 +5,7 @@
 
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/kernel/accounting.h>
+#include <vrpipe/kernel/pipeline_stages.h>
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/pipeline/slots/prop.h>
 
@@ -50,6 +51,13 @@ struct PropTime {
   const std::uint32_t latency_cycles;
   const Order order;
 
+  /// Of bins and survivors, beats of quads.
+  PipelineStages of_bins() const { return PipelineStages::of_latency(latency_cycles); }
+  PipelineStages of_late_tests() const { return PipelineStages::of_latency(latency_cycles, quads_per_cycle); }
+  /// Of beats of colours.
+  PipelineStages of_colors() const {
+    return PipelineStages::of_latency(latency_cycles, ColorBeat::in_a_cycle(color_rate));
+  }
   /// As in PropWork.
   std::vector<WorkKind> kinds() const {
     return {{"bins", 0, 1.0 / quads_per_cycle, false},

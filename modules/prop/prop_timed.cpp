@@ -54,12 +54,12 @@ class TimedProp : public TimedUnit {
         there_{BatchLimit(time_.quads_per_cycle), {}},
         back_{BatchLimit(time_.quads_per_cycle), {}},
         color_(time_.color_rate.items),
-        beats_a_cycle_(ColorBeat::in_a_cycle(time_.color_rate)),
+        beats_a_cycle_(time_.of_colors().items_per_cycle),
         late_(time_.quads_per_cycle) {
-    out_test_.set_pipeline(time_.latency_cycles - 1, 1);
-    out_survivors_.set_pipeline(time_.latency_cycles - 1, 1);
-    out_color_.set_pipeline(time_.latency_cycles - 1, beats_a_cycle_);
-    out_late_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
+    out_test_.set_pipeline(time_.of_bins());
+    out_survivors_.set_pipeline(time_.of_bins());
+    out_color_.set_pipeline(time_.of_colors());
+    out_late_.set_pipeline(time_.of_late_tests());
     out_late_.set_optional();
     in_late_.set_optional();
     in_tested_.set_comes_ahead();

@@ -40,10 +40,10 @@ class PropUnit : public Unit {
         order_(time_.order, context),
         color_limit_(time_.color_rate),
         late_limit_(time_.quads_per_cycle) {
-    out_test_.set_pipeline(time_.latency_cycles - 1, 1);
-    out_survivors_.set_pipeline(time_.latency_cycles - 1, 1);
-    out_color_.set_pipeline(time_.latency_cycles - 1, ColorBeat::in_a_cycle(time_.color_rate));
-    out_late_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
+    out_test_.set_pipeline(time_.of_bins());
+    out_survivors_.set_pipeline(time_.of_bins());
+    out_color_.set_pipeline(time_.of_colors());
+    out_late_.set_pipeline(time_.of_late_tests());
     out_late_.set_optional();
     in_late_.set_optional();
     in_bins_.set_passes_to(tests_ ? out_test_ : out_survivors_, 0);

@@ -24,7 +24,7 @@ class TimedQru : public TimedUnit {
         timing_(behaviour_->timing()),
         numbering_(context, *behaviour_),
         budget_(timing_.items_per_cycle) {
-    out_.set_pipeline(timing_.latency_cycles - 1, 1);
+    out_.set_pipeline(QruWork::pipeline(timing_));
   }
 
   Behaviour& behaviour() override { return *behaviour_; }

@@ -21,7 +21,7 @@ class QruUnit : public Unit {
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         numbering_(context, *behaviour_) {
-    out_.set_pipeline(timing_.latency_cycles - 1, 1);
+    out_.set_pipeline(QruWork::pipeline(timing_));
   }
 
   bool idle() const override { return in_.empty(); }

@@ -8,6 +8,7 @@
 
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/kernel/accounting.h>
+#include <vrpipe/kernel/pipeline_stages.h>
 #include <vrpipe/pipeline/effects.h>
 #include <vrpipe/pipeline/geometry.h>
 #include <vrpipe/pipeline/render_context.h>
@@ -110,6 +111,8 @@ struct RasterTime {
     return {RasterWork::bare_setup, bare_setup_interval_thousandths};
   }
 
+  /// Of beats of quads.
+  PipelineStages pipeline() const { return PipelineStages::of_latency(setup_latency_cycles, fine_tiles_per_cycle); }
   /// As in RasterWork.
   std::vector<WorkKind> kinds() const {
     return {{"set-up", 0, setup_interval_thousandths / 1000.0, false},

@@ -24,7 +24,7 @@ class TimedRaster : public TimedUnit {
         coarse_(time_.coarse_tiles_per_cycle),
         fine_(time_.fine_tiles_per_cycle),
         quads_out_(time_.quads_per_cycle) {
-    out_.set_pipeline(time_.setup_latency_cycles - 1, time_.fine_tiles_per_cycle);
+    out_.set_pipeline(time_.pipeline());
     in_hi_z_.set_optional();
     in_hi_z_.set_comes_ahead();
   }

@@ -20,7 +20,7 @@ class RasterUnit : public Unit {
         in_hi_z_(*this, "in_hi_z"),
         behaviour_(std::move(behaviour)),
         time_(behaviour_->time()) {
-    out_.set_pipeline(time_.setup_latency_cycles - 1, time_.fine_tiles_per_cycle);
+    out_.set_pipeline(time_.pipeline());
     in_hi_z_.set_optional();
     in_hi_z_.set_answers();
   }

@@ -6,6 +6,7 @@
 
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/kernel/accounting.h>
+#include <vrpipe/kernel/pipeline_stages.h>
 #include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/hi_z_plan.h>
 #include <vrpipe/pipeline/late_plan.h>
@@ -53,6 +54,8 @@ struct TcTime {
   std::uint32_t timeout_in(Termination termination) const {
     return termination == Termination::strict ? 0 : idle_timeout_cycles;
   }
+  /// Of flushed bins, beats of quads.
+  PipelineStages pipeline() const { return PipelineStages::of_latency(latency_cycles); }
   /// As in TcWork.
   std::vector<WorkKind> kinds() const {
     return {{"quads", 0, 1.0 / quads_per_cycle, true}, {"read-out", 1, 1.0, false}};

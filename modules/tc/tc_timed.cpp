@@ -30,7 +30,7 @@ class TimedTc : public TimedUnit {
         time_out_gate_(context, "tc.time_out"),
         entries_(time_.quads_per_cycle),
         sent_at_(time_.flush_queue_bins, 0) {
-    out_.set_pipeline(time_.latency_cycles - 1, 1);
+    out_.set_pipeline(time_.pipeline());
   }
 
   Behaviour& behaviour() override { return *behaviour_; }

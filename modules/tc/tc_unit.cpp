@@ -23,7 +23,7 @@ class TcUnit : public Unit {
         idle_timeout_cycles_(time_.timeout_in(context.termination)),
         time_out_gate_(context, "tc.time_out"),
         queue_(time_.flush_queue_bins) {
-    out_.set_pipeline(time_.latency_cycles - 1, 1);
+    out_.set_pipeline(time_.pipeline());
   }
 
   bool idle() const override { return in_.empty() && queued_ == 0 && mark_ == Mark::none && !holds_quads_; }

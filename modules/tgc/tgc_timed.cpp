@@ -18,7 +18,7 @@ class TimedTgc : public TimedUnit {
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         entries_(timing_.items_per_cycle) {
-    out_.set_pipeline(timing_.latency_cycles - 1, 1);
+    out_.set_pipeline(TgcWork::pipeline(timing_));
   }
 
   Behaviour& behaviour() override { return *behaviour_; }

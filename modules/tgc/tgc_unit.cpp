@@ -15,7 +15,7 @@ class TgcUnit : public Unit {
         out_(*this, "out_jobs"),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()) {
-    out_.set_pipeline(timing_.latency_cycles - 1, 1);
+    out_.set_pipeline(TgcWork::pipeline(timing_));
   }
 
   bool idle() const override {

@@ -18,7 +18,7 @@ class TimedVpo : public TimedUnit {
         in_(*this, "in_vertices",
             [this](const VertexWarp& warp, CycleInterval visible) { return assemble(warp, visible.first); }),
         lane_(timing_.items_per_cycle) {
-    out_.set_pipeline(timing_.latency_cycles - 1, timing_.items_per_cycle);
+    out_.set_pipeline(VpoWork::pipeline(timing_));
   }
 
   Behaviour& behaviour() override { return *behaviour_; }

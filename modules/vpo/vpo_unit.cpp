@@ -17,7 +17,7 @@ class VpoUnit : public Unit {
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         ends_batches_(gpcs > 1) {
-    out_.set_pipeline(timing_.latency_cycles - 1, timing_.items_per_cycle);
+    out_.set_pipeline(VpoWork::pipeline(timing_));
   }
 
   bool idle() const override { return at_ == count_ && !has_end_ && in_.empty(); }

@@ -20,7 +20,7 @@ class TimedWdx : public TimedUnit {
         queues_(std::size_t{gpcs} * gpcs, SlotPool(timing_.credits)) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       outs_.push_back(std::make_unique<TimedOut<PrimitiveItem>>(*this, "out_primitives_" + std::to_string(gpc)));
-      outs_.back()->set_pipeline(timing_.latency_cycles - 2, timing_.primitives_per_cycle);
+      outs_.back()->set_pipeline(WdxWork::pipeline(timing_));
     }
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       ins_.push_back(

@@ -26,8 +26,7 @@ class WdxUnit : public Unit {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       ins_.push_back(std::make_unique<StreamIn<PrimitiveItem>>(*this, "in_primitives_" + std::to_string(gpc)));
       outs_.push_back(std::make_unique<StreamOut<PrimitiveItem>>(*this, "out_primitives_" + std::to_string(gpc)));
-      // A cycle of the latency is the queue's.
-      outs_.back()->set_pipeline(timing_.latency_cycles - 2, timing_.primitives_per_cycle);
+      outs_.back()->set_pipeline(WdxWork::pipeline(timing_));
     }
   }
 

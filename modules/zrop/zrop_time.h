@@ -10,6 +10,7 @@
 #include "zrop_parameters.h"
 
 #include <vrpipe/kernel/accounting.h>
+#include <vrpipe/kernel/pipeline_stages.h>
 #include <vrpipe/pipeline/slots/zrop.h>
 
 namespace vrpipe {
@@ -34,6 +35,8 @@ struct ZropTime {
   /// The first cycle after so many quads that are tested from one on.
   Cycle end_of_tests(Cycle at, unsigned quads) const { return at + (quads + quads_per_cycle - 1) / quads_per_cycle; }
 
+  /// Of what it has tested, early or late, and of its reports to Hi-Z.
+  PipelineStages pipeline() const { return PipelineStages::of_latency(latency_cycles, quads_per_cycle); }
   /// As in ZropWork.
   std::vector<WorkKind> kinds() const {
     return {{"tests", 0, 1.0 / quads_per_cycle, true},

@@ -41,16 +41,15 @@ class ZropUnit : public Unit {
         block_time_(time_.quads_per_cycle,
                     [this](std::uint64_t work, Cycle from, Cycle until) { did(ZropWork::blocks, work, from, until); }),
         hi_z_(context) {
-    out_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
-    out_hi_z_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
+    out_.set_pipeline(time_.pipeline());
+    out_hi_z_.set_pipeline(time_.pipeline());
     if (!EffectGate(context, "cache.details").is_active()) cache_statistics_.leave_out_details();
     out_hi_z_.set_optional();
-    out_late_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
+    out_late_.set_pipeline(time_.pipeline());
     out_late_.set_optional();
     in_late_.set_optional();
     in_late_.set_comes_ahead();
     in_terminations_.set_answers();
-    out_reads_.set_pipeline(0, 2 * QuadBeat::capacity);
     out_reads_.set_optional();
   }
 

@@ -60,7 +60,7 @@ TEST(Link, TheSendersPipelineAddsItsLatencyAndItsPlaces) {
   Bench bench;
   Source<int>& source = bench.source<int>();
   Sink<int>& sink = bench.sink<int>();
-  source.out().set_pipeline(5, 2);
+  source.out().set_pipeline({5, 2});
   source.out().connect(sink.in(), 4, 1);
   EXPECT_EQ(clocked(sink).depth(), 4u + 5 * 2);
   source.add(1, 10);

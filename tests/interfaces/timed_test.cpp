@@ -118,7 +118,7 @@ TEST_P(TimedLink, TheSendersPipelineAddsItsLatency) {
   ClockDomain clock("clock", 1000);
   Sender sender("sender", clock);
   Taker taker("taker", clock, 1);
-  sender.out.set_pipeline(5, 2);
+  sender.out.set_pipeline({5, 2});
   sender.out.connect(taker.in, 4, 1);
   taker.in.open();
   sender.at = {10};

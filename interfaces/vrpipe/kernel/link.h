@@ -12,6 +12,7 @@
 #include <vrpipe/component/error.h>
 #include <vrpipe/kernel/clock_domain.h>
 #include <vrpipe/kernel/link_observer.h>
+#include <vrpipe/kernel/pipeline_stages.h>
 
 /// The stream link between two units: TLM-2.0 sockets with protocol traits of our own.
 ///
@@ -180,15 +181,10 @@ class OutEnd : public OutPort, protected tlm::tlm_bw_transport_if<StreamProtocol
 
   StreamInitiatorSocket<Item> socket;
 
-  /// The sender has a pipeline of this many cycles behind what it pushes, `items_per_cycle` wide; the items in it do
-  /// not take places of the receiver's queue. Before `connect`.
-  void set_pipeline(unsigned latency_cycles, unsigned items_per_cycle = 1) {
-    pipeline_ = latency_cycles;
-    pipeline_items_ = latency_cycles * items_per_cycle;
-  }
+  /// The stages behind what the sender pushes. Before `connect`.
+  void set_pipeline(const PipelineStages& pipeline) { pipeline_ = pipeline; }
+  const PipelineStages& pipeline() const { return pipeline_; }
   std::uint64_t transferred() const override { return transferred_; }
-  unsigned pipeline_items() const { return pipeline_items_; }
-  unsigned pipeline_cycles() const { return pipeline_; }
   /// Called when the socket is bound by hand, for instance through a recorder.
   void taken() { mark_connected(); }
   using OutPort::connect;
@@ -208,7 +204,7 @@ class OutEnd : public OutPort, protected tlm::tlm_bw_transport_if<StreamProtocol
   virtual void unlimited() = 0;
 
   std::uint64_t transferred_ = 0;
-  unsigned pipeline_ = 0;
+  PipelineStages pipeline_;
 
  private:
   struct Sink : sc_core::sc_module, tlm::tlm_fw_transport_if<StreamProtocol<Item>> {
@@ -224,7 +220,6 @@ class OutEnd : public OutPort, protected tlm::tlm_bw_transport_if<StreamProtocol
 
   void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
 
-  unsigned pipeline_items_ = 0;
   std::unique_ptr<Sink> stub_;
   std::unique_ptr<LinkTap<Item>> tap_;
 };
@@ -259,7 +254,7 @@ class StreamOut : public OutEnd<Item> {
     --credits_;
     ++this->transferred_;
     if (direct_ == nullptr) return transfer(item);
-    direct_->accept(item, this->pipeline_);
+    direct_->accept(item, this->pipeline_.cycles);
   }
 
  private:
@@ -286,7 +281,7 @@ class StreamOut : public OutEnd<Item> {
   [[gnu::noinline]] void transfer(const Item& item) {
     if (rate_ != 0) ++passed_;
     payload_.item = &item;
-    payload_.latency = this->pipeline_;
+    payload_.latency = this->pipeline_.cycles;
     StreamPhase phase = StreamPhase::transfer;
     sc_core::sc_time delay;
     this->socket->nb_transport_fw(payload_, phase, delay);
@@ -520,7 +515,7 @@ ItemObserver<Item>* observer_of(const LinkObservers& observers, const Port& port
 template <class Item>
 void OutEnd<Item>::connect(InPort& in, const LinkOptions& options) {
   InEnd<Item>& end = receiving_end<Item>(*this, in);
-  end.configure(options.depth + pipeline_items_, options.latency);
+  end.configure(options.depth + pipeline_.cycles * pipeline_.items_per_cycle, options.latency);
   if (ItemObserver<Item>* const observer = observer_of<Item>(options.observers, *this)) {
     tap_ = std::make_unique<LinkTap<Item>>(sc_core::sc_gen_unique_name("tap"), *clock_.domain, *observer);
     socket.bind(tap_->in);

@@ -371,10 +371,6 @@ bool connect_across(const BorderLink& link, const LinkOptions& options) {
   const bool receives = link.to != nullptr ? exact_in != nullptr : dynamic_cast<TimedIn<Loose>*>(&link.in) != nullptr;
   if (!sends || !receives) return false;
   const LinkOptions plain{options.depth, options.latency, 0, {}};
-  const auto repeat_pipeline = [](auto& later, const auto& before) {
-    const unsigned cycles = before.pipeline_cycles();
-    later.set_pipeline(cycles, cycles == 0 ? 1 : before.pipeline_items() / cycles);
-  };
   TimedOut<Loose>* before = loose_out;
   OutOfCycle<Exact, Loose>* leaves = nullptr;
   if (link.from != nullptr) {
@@ -382,7 +378,7 @@ bool connect_across(const BorderLink& link, const LinkOptions& options) {
     exact_out->connect(exit->in, plain);
     leaves = exit.get();
     before = &exit->out;
-    repeat_pipeline(*before, *exact_out);
+    before->set_pipeline(exact_out->pipeline());
     link.from->keep(std::move(exit));
   }
   if (link.to == nullptr) {
@@ -392,7 +388,7 @@ bool connect_across(const BorderLink& link, const LinkOptions& options) {
   auto entry = std::make_unique<IntoCycle<Exact, Loose>>(sc_core::sc_gen_unique_name("border"), link);
   before->connect(entry->in, plain);
   if (leaves != nullptr) leaves->set_entry(*entry);
-  repeat_pipeline(entry->out, *before);
+  entry->out.set_pipeline(before->pipeline());
   entry->connect(*exact_in, options);
   if (link.in.has_answers() && before->can_be_asked()) link.to->add_asked([before](Cycle edge) { before->ask(edge); });
   link.to->keep(std::move(entry));

@@ -179,7 +179,8 @@ class TimedOut : public OutEnd<Item> {
   CycleInterval send(const Item& item, CycleInterval at, unsigned beats = 1, bool joins = false) {
     if (this->limited_) at = limited(at, beats, joins);
     ++this->transferred_;
-    at = direct_ != nullptr ? direct_->offer(item, at, beats, joins, this->pipeline_) : call(item, at, beats, joins);
+    at = direct_ != nullptr ? direct_->offer(item, at, beats, joins, this->pipeline_.cycles)
+                            : call(item, at, beats, joins);
     last_ = at.last;
     return at;
   }
@@ -207,7 +208,7 @@ class TimedOut : public OutEnd<Item> {
   CycleInterval call(const Item& item, CycleInterval at, unsigned beats, bool joins) {
     StreamPayload<Item> payload;
     payload.item = &item;
-    payload.latency = this->pipeline_;
+    payload.latency = this->pipeline_.cycles;
     payload.at = at.first;
     payload.last = at.last;
     payload.beats = beats;

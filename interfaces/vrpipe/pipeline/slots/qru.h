@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <vrpipe/kernel/accounting.h>
+#include <vrpipe/kernel/pipeline_stages.h>
 #include <vrpipe/pipeline/payload.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
@@ -42,6 +43,8 @@ class QruBehaviour : public Behaviour {
 struct QruWork {
   enum : unsigned { quads, launches };  ///< quads examined in cycles without a launch, which ends a cycle
   static std::vector<WorkKind> kinds(const Throughput& timing);
+  /// Of the warps that it sends.
+  static PipelineStages pipeline(const Throughput& timing) { return PipelineStages::of_latency(timing.latency_cycles); }
 };
 
 /// The slot's SlotCheck.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <vrpipe/kernel/accounting.h>
+#include <vrpipe/kernel/pipeline_stages.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
 namespace vrpipe {
@@ -41,6 +42,8 @@ class TgcBehaviour : public Behaviour {
 struct TgcWork {
   enum : unsigned { entries, primitives };
   static std::vector<WorkKind> kinds(const Throughput& timing);
+  /// Of the jobs that it sends.
+  static PipelineStages pipeline(const Throughput& timing) { return PipelineStages::of_latency(timing.latency_cycles); }
 };
 
 /// The slot's SlotCheck.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <vrpipe/kernel/accounting.h>
+#include <vrpipe/kernel/pipeline_stages.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
 namespace vrpipe {
@@ -27,6 +28,10 @@ class VpoBehaviour : public Behaviour {
 struct VpoWork {
   enum : unsigned { triangles };
   static std::vector<WorkKind> kinds(const Throughput& timing);
+  /// Of the primitives that it sends.
+  static PipelineStages pipeline(const Throughput& timing) {
+    return PipelineStages::of_latency(timing.latency_cycles, timing.items_per_cycle);
+  }
 };
 
 /// The slot's SlotCheck.

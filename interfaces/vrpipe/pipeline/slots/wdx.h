@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <vrpipe/kernel/accounting.h>
+#include <vrpipe/kernel/pipeline_stages.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 #include <vrpipe/pipeline/tile_owners.h>
 
@@ -38,6 +39,10 @@ inline GpcSet receivers_of(const PrimitiveItem& item, const TileOwners& owners) 
 struct WdxWork {
   enum : unsigned { taken, handed_on };
   static std::vector<WorkKind> kinds(const WdxBehaviour::Timing& timing, unsigned gpcs);
+  /// Of the primitives that it sends to a GPC. A cycle of the latency is that of the queues in which they wait for their turn.
+  static PipelineStages pipeline(const WdxBehaviour::Timing& timing) {
+    return PipelineStages::of_latency(timing.latency_cycles - 1, timing.primitives_per_cycle);
+  }
 };
 
 /// The slot's SlotCheck.
