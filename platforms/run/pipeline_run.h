@@ -14,10 +14,10 @@ class FrameSampler;
 RunResult simulate_pipeline(const RunRequest& request, const Frame& frame, std::atomic<float>* progress,
                             FrameSampler* sampler = nullptr);
 
-/// What a run at lt says of itself, by the occupancy of its bottleneck.
-double expected_error_percent(double occupancy);
-
+bool samples_statistics(const RunRequest& request);
 /// Throws UserError for statistics that are to be sampled of a run that has no time for most of its course, or none.
 void check_sampling_has_time(const RunRequest& request);
+/// Throws UserError for a run that is to stop at a cycle, at a fidelity that cannot.
+void check_may_stop(const RunRequest& request);
 
 }  // namespace vrpipe

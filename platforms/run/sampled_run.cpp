@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "run/expected_error.h"
 #include "run/frame_sampler.h"
 #include "run/pipeline_run.h"
 #include "run/result_hash.h"
@@ -114,7 +115,7 @@ class WayWithin {
     result.request = as_taken(request_, result.way);
   }
   std::optional<RunResult> by_lt() {
-    const double least = expected_error_percent(1);
+    const double least = least_expected_error_percent();
     if (request_.error_percent < least) {
       because_.push_back(fmt::format("lt never says less than {:.1f} %", least));
       return std::nullopt;
