@@ -112,7 +112,7 @@ class CropTime {
     open(at);
     std::int64_t parts = price.parts;
     if (in_pairs_) go_with(quad, price.joins);
-    if (column_parts_ > 0 && quad.blends) parts += lengthen(quad);
+    if (column_parts_ > 0 && quad.blends) parts += lengthen(quad, at);
     done_ += parts;
     unpaired_ += parts - price_;
     if (!forwards && quad.blends) in_pipeline_.push({address_of(quad.place), at, quad.live});
@@ -141,11 +141,12 @@ class CropTime {
   /// Of the last quad; 0 before the first.
   Cycle last_blend() const { return last_blend_; }
   /// The cache moves so many sectors without a port; false if that takes the blender nothing, since the cache is idle
-  /// beside a blend of several cycles.
+  /// beside a blend of several cycles. `at` does not go back.
   bool move(unsigned sectors, Cycle at) {
     const std::int64_t parts = sectors * sector_price_;
-    if (idle_cache_ >= parts) {
-      idle_cache_ -= parts;
+    while (idle_cache_.size() > 1 && idle_cache_[1].at <= at) idle_cache_.pop();
+    if (!idle_cache_.empty() && idle_cache_.front().at <= at && idle_cache_.front().parts >= parts) {
+      idle_cache_.front().parts -= parts;
       return false;
     }
     open(at);
@@ -212,7 +213,7 @@ class CropTime {
     group_.own += price_;
   }
   /// Columns of two pixels with live samples, of which each takes so long: what that is beyond the price.
-  std::int64_t lengthen(const Quad& quad) {
+  std::int64_t lengthen(const Quad& quad, Cycle at) {
     std::int64_t more = columns_of(quad.live) * column_parts_ - price_;
     if (more <= 0) return 0;
     if (in_pairs_) {
@@ -220,7 +221,9 @@ class CropTime {
       more = group_.lengthened_by(own, parts_of_a_cycle);
       group_.own += own;
     }
-    idle_cache_ = more;
+    // Of a move lt is told late: once what is in the queue before its quad has been blended.
+    if (idle_cache_.size() > std::max(input_quads, fetch_ahead_quads)) idle_cache_.pop();
+    idle_cache_.push({at, more});
     return more;
   }
 
@@ -238,6 +241,10 @@ class CropTime {
     Cycle at = 0;
     LaneMask live = 0;
   };
+  struct Idle {
+    Cycle at = 0;            ///< of the blend
+    std::int64_t parts = 0;  ///< in which nothing moves
+  };
   std::size_t address_of(std::size_t place) const {
     return place & (~std::size_t{positions_per_tile - 1} | hazard_mask_);
   }
@@ -248,15 +255,15 @@ class CropTime {
     std::uint64_t lines = 0;  ///< that it has asked for, a bit each
   };
 
-  std::int64_t price_;           ///< of a quad by its rate
-  std::int64_t sector_price_;    ///< of one that moves
-  std::int64_t column_parts_;    ///< 0: columns have no price
-  bool in_pairs_;                ///< several quads go in a cycle only if they share a sector
-  std::int64_t most_kept_;       ///< of a cycle's parts in the next one
-  Divisor cycles_;               ///< of parts
-  std::int64_t done_ = 0;        ///< parts from the beginning, those that were lost too
-  std::int64_t idle_cache_ = 0;  ///< parts of the last blend of several cycles, in which nothing moves
-  Group group_;                  ///< the last quads that go together
+  std::int64_t price_;         ///< of a quad by its rate
+  std::int64_t sector_price_;  ///< of one that moves
+  std::int64_t column_parts_;  ///< 0: columns have no price
+  bool in_pairs_;              ///< several quads go in a cycle only if they share a sector
+  std::int64_t most_kept_;     ///< of a cycle's parts in the next one
+  Divisor cycles_;             ///< of parts
+  std::int64_t done_ = 0;      ///< parts from the beginning, those that were lost too
+  Ring<Idle> idle_cache_;      ///< by the last blends of several cycles
+  Group group_;                ///< the last quads that go together
   Cycle last_blend_ = 0;
   std::int64_t unpaired_ = 0;  ///< parts of the last quads' price beyond their rate's
   std::int64_t settled_ = 0;   ///< and of those before, not tallied yet

@@ -44,6 +44,7 @@ class TimedCrop : public TimedUnit {
         hazard_gate_(context, "crop.blend_hazard"),
         // A hazard is one of quads, as is what waits for a line that comes back.
         at_once_(time_.forwards && !time_.fetches_ahead() ? time_.looked_up_at_once() : 1),
+        moves_hide_(!time_.quads_are_alike()),
         memory_(*this, "memory", time_.mshrs,
                 at_once_ == 1 ? 1 : std::min(time_.cache.sectors_of_a_line(), time_.mshrs), time_.cache.sector_bytes,
                 dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics,
@@ -139,7 +140,7 @@ class TimedCrop : public TimedUnit {
       send(time_.flits_of_reads(warp, from, to, cache_, *behaviour_->surface()), looked_up.last);
       there = std::max(there, time_.port.open_from(there));
     } else if (const unsigned moved = memory_.take_moved(); moved > 0) {
-      moves_.push({looked_up.last, moved});
+      moves_hide_ ? move_for_quads(warp, from, to, looked_up, moved) : moves_.push({looked_up.last, moved});
     }
 
     if (fetches_ahead) there = std::max(there, look_again(warp, from, looked_up.last));
@@ -165,6 +166,22 @@ class TimedCrop : public TimedUnit {
   /// Whether a quad is blended in the cycle of the last that signalled, from one on, so that its signal would go with it.
   bool joins_signals(Cycle there) const {
     return signalled_ < TerminationBeat::capacity && time_.free_from(time_.price(), there) == signalled_at_;
+  }
+  /// Of so many sectors that move for quads each moves when its quad is looked up, those written back first.
+  [[gnu::noinline]] void move_for_quads(const ShadedWarp& warp, unsigned from, unsigned to, CycleInterval looked_up,
+                                        unsigned moved) {
+    for (unsigned i = from; i < to; ++i) {
+      const auto& [line, sectors] = sectors_of(warp, i);
+      LineAccess& access = cache_.lines[cache_.place_of[line]];
+      const Cycle at = looked_up.of_part(i - from, to - from);
+      const auto written_back = static_cast<unsigned>(__builtin_popcount(std::exchange(access.written_back, 0)));
+      const auto filled = static_cast<unsigned>(__builtin_popcount(access.filled & sectors));
+      access.filled &= ~sectors;
+      if (written_back > 0) moves_.push({at, written_back});
+      for (unsigned sector = 0; sector < filled; ++sector) moves_.push({at, 1});
+      moved -= written_back + filled;
+    }
+    if (moved > 0) moves_.push({looked_up.last, moved});  // for second looks before these
   }
   /// Takes the time of quads whose sectors are there from a cycle on.
   [[gnu::always_inline]] CycleInterval blend_in_turn(const ShadedWarp& warp, unsigned from, unsigned to, Cycle there) {
@@ -345,6 +362,7 @@ class TimedCrop : public TimedUnit {
   const BarrierPlan barriers_;
   EffectGate hazard_gate_;
   const unsigned at_once_;  ///< quads looked up before the first of them is blended
+  const bool moves_hide_;   ///< behind quads of several cycles
   TimedCachePort memory_;
   std::unique_ptr<BlendOrderMonitor> monitor_;
   CropBehaviour::CacheLookUp cache_;

@@ -185,11 +185,18 @@ Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& fr
   return from + behaviour_->bank_cycles(access.bytes);
 }
 
-bool AnnotatedL2::depends_on_order() const {
+MemoryUnit::Order AnnotatedL2::order(Cycle end, bool is_bottleneck) const {
+  const auto waits = [this](Cycle cycles) {
+    return std::any_of(ports_.begin(), ports_.end(), [cycles](const auto& port) { return port->waits(cycles); });
+  };
+  if (is_bottleneck) return waits(1) ? Order::matters : Order::does_not_matter;
+  // Fetches, of which so many are under way on average.
+  const auto are_under_way = [&](std::uint64_t fetches) { return read_cycles_ > fetches * crossing_.over_by(end); };
+  if (are_under_way(40)) return Order::matters;
   constexpr std::uint64_t long_fetch = 8;  // in quickest ones
-  return (reads_ > 0 && read_cycles_ > long_fetch * reads_ * quickest_read_) ||
-         std::any_of(ports_.begin(), ports_.end(),
-                     [this](const auto& port) { return port->waits(sizes_.latency_cycles / 2); });
+  const bool are_long = reads_ > 0 && read_cycles_ > long_fetch * reads_ * quickest_read_;
+  return (are_long && are_under_way(10)) || waits(sizes_.latency_cycles / 2) ? Order::is_hidden_by_units
+                                                                             : Order::does_not_matter;
 }
 
 std::vector<OccupancyPart> AnnotatedL2::parts(Cycle end) const {

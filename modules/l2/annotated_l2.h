@@ -32,8 +32,8 @@ class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private 
   MemoryBytes memory_bytes() const override { return memory_.moved(); }
   MemoryBehaviour& behaviour() override { return *behaviour_; }
   const StatisticSet& statistics() const override { return statistics_; }
-  /// Both limits are measured: benchmarks/lt_errors.
-  bool depends_on_order() const override;
+  /// The limits are measured: benchmarks/lt_errors.
+  Order order(Cycle end, bool is_bottleneck) const override;
   std::vector<OccupancyPart> parts(Cycle end) const override;
 
  private:

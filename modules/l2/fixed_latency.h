@@ -79,6 +79,8 @@ class FixedLatencyUnit final : public MemoryUnit {
   MemoryBytes memory_bytes() const override { return {memory_.cache().bytes_filled.value(), 0}; }
   MemoryBehaviour& behaviour() override { return *behaviour_; }
   const StatisticSet& statistics() const override { return memory_; }
+  /// It has no banks and no rows.
+  Order order(Cycle /*end*/, bool /*is_bottleneck*/) const override { return Order::does_not_matter; }
   std::vector<OccupancyPart> parts(Cycle end) const override {
     return {{"bytes", 0, static_cast<double>(memory_.bytes(end)) / memory_.peak_rate(), true}};
   }

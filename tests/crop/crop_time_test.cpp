@@ -141,6 +141,17 @@ TEST(CropTime, ColumnsOfRgba32fLastAndTheCacheIsIdleBesideThem) {
   EXPECT_EQ(blended(time, column, 10), 22U) << "one column";
 }
 
+TEST(CropTime, AMoveOfWhichItIsToldLateIsBesideTheBlendOfItsTime) {
+  CropTime time = time_of({{"rgba32f_column_cycles", "4"}, {"sectors_per_cycle", "1"}}, ColorFormat::rgba32f);
+  const Cycle first = blended(time, quad_of(0), 10);
+  const Cycle second = blended(time, quad_of(0), 10);
+  ASSERT_EQ(second - first, 8U);
+  EXPECT_TRUE(time.move(1, first - 1)) << "before there was one";
+  EXPECT_FALSE(time.move(7, first + 1)) << "its rate is one of the eight cycles";
+  EXPECT_TRUE(time.move(1, second - 1)) << "nothing is left of them";
+  EXPECT_FALSE(time.move(1, second));
+}
+
 TEST(CropTime, WithoutForwardingAQuadWaitsForOneOfTheSamePixels) {
   CropTime time = time_of({{"forwarding", "off"}, {"latency_cycles", "9"}}, ColorFormat::rgba16f);
   CropTime::Quad left = quad_of(0, 3);

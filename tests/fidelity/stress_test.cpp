@@ -120,24 +120,42 @@ TEST(ExpectedError, IsSmallWhereTheBottleneckNeverRests) {
   EXPECT_GT(*waiting.expected_error_percent, 1.5);
 }
 
+RunResult at_lt_on(const char* platform, std::vector<Setting> settings) {
+  return run(on(platform,
+                request_of("baseline", Fidelity::lt, [&](RunRequest& r) { r.settings = std::move(settings); })),
+             random_draw(160, 120, 2000, 6));
+}
+
 /// lt answers a read of memory before it knows of those that are asked for later and come first.
 TEST(ExpectedError, IsLargeWhereRequestsWaitForOneAnotherInMemory) {
-  const Draw draw = random_draw(160, 120, 2000, 6);
-  const auto at_lt = [&](std::vector<Setting> settings) {
-    return run(on("agx-orin",
-                  request_of("baseline", Fidelity::lt, [&](RunRequest& r) { r.settings = std::move(settings); })),
-               draw);
-  };
-  EXPECT_LT(*at_lt({}).expected_error_percent, 3);
-  EXPECT_EQ(at_lt({{"dram", "channels", "1"}, {"dram", "tccd_l_ps", "100000"}}).expected_error_percent, 10)
-      << "for long";
-  EXPECT_EQ(at_lt({{"sm", "cores", "4"}, {"draw", "warps_per_1024_cycles", "1000"}, {"sm", "vertex_warps", "100"}})
-                .expected_error_percent,
+  EXPECT_LT(*at_lt_on("agx-orin", {}).expected_error_percent, 3);
+  EXPECT_EQ(at_lt_on("agx-orin", {{"dram", "channels", "1"}, {"dram", "tccd_l_ps", "100000"}}).expected_error_percent,
             10)
-      << "at a port of 128 bytes a cycle";
-  const RunResult slow = at_lt({{"l2", "frequency_mhz", "1"}});
+      << "for long";
+  const RunResult slow = at_lt_on("agx-orin", {{"l2", "frequency_mhz", "1"}});
   EXPECT_EQ(slow.bottleneck->unit, "l2");
   EXPECT_EQ(slow.expected_error_percent, 10);
+}
+
+/// At a port of 128 bytes a cycle.
+TEST(ExpectedError, IsLargeWhereNoUnitHidesThatRequestsWait) {
+  std::vector<Setting> settings{{"sm", "cores", "4"},
+                                {"draw", "warps_per_1024_cycles", "1000"},
+                                {"sm", "vertex_warps", "100"}};
+  const RunResult hidden = at_lt_on("agx-orin", settings);
+  EXPECT_GT(hidden.bottleneck->occupancy, 0.95);
+  EXPECT_LT(*hidden.expected_error_percent, 3);
+  settings.push_back({"crop", "bytes_per_cycle", "128"});
+  settings.push_back({"prop", "color_bytes_per_cycle", "128"});
+  const RunResult seen = at_lt_on("agx-orin", settings);
+  EXPECT_LT(seen.bottleneck->occupancy, 0.92);
+  EXPECT_GT(*seen.expected_error_percent, 3);
+}
+
+TEST(ExpectedError, IsSmallWhereMemoryHasNoBanks) {
+  const RunResult slow = at_lt_on("agx-orin-ideal-memory", {{"l2", "frequency_mhz", "1"}});
+  EXPECT_EQ(slow.bottleneck->unit, "l2");
+  EXPECT_LT(*slow.expected_error_percent, 3);
 }
 
 void expect_lt_is_near(RunRequest request, const Draw& draw, double tolerance) {
@@ -236,6 +254,19 @@ TEST(Stress, LongVertexShadersWaitForFragmentsAndFragmentsForThem) {
                                                r.settings = {{"sm", "vertex_instructions", "1000"}};
                                              })),
                     random_draw(160, 120, 2000, 6), 0.05);
+}
+
+/// Each quad's beside those that are blended when it is looked up, a queue before it.
+TEST(Stress, SectorsMoveBesideQuadsOfSeveralCycles) {
+  for (const char* columns : {"1", "2"}) {
+    SCOPED_TRACE(columns);
+    expect_lt_is_near(request_of("baseline", Fidelity::cycle,
+                                 [&](RunRequest& r) {
+                                   r.format = ColorFormat::rgba32f;
+                                   r.settings = {{"crop", "rgba32f_column_cycles", columns}};
+                                 }),
+                      random_draw(160, 120, 2000, 6), 0.002);
+  }
 }
 
 }  // namespace

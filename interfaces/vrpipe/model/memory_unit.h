@@ -32,8 +32,13 @@ class MemoryUnit {
   virtual void close(Cycle end) { static_cast<void>(end); }
   /// That depend on time; those of the functional model are reported with them.
   virtual const StatisticSet& statistics() const = 0;
-  /// At `lt`: whether requests wait for one another so long that it tells in which order they are asked for.
-  virtual bool depends_on_order() const { return false; }
+  /// At `lt`, which answers requests in the order of calls: whether it tells in which order they come. Not where none waits for
+  /// another one; where few do, only if no unit is busy all the time, since it hides what memory takes.
+  enum class Order : std::uint8_t { does_not_matter, is_hidden_by_units, matters };
+  /// After a run of so many cycles; for a memory that nothing else is busier than.
+  virtual Order order(Cycle /*end*/, bool is_bottleneck) const {
+    return is_bottleneck ? Order::matters : Order::does_not_matter;
+  }
   /// What its time went on, up to the end of the frame.
   virtual std::vector<OccupancyPart> parts(Cycle end) const = 0;
 };
