@@ -44,7 +44,6 @@ class TimedCrop : public TimedUnit {
         hazard_gate_(context, "crop.blend_hazard"),
         // A hazard is one of quads, as is what waits for a line that comes back.
         at_once_(time_.forwards && !time_.fetches_ahead() ? time_.looked_up_at_once() : 1),
-        moves_hide_(!time_.quads_are_alike()),
         memory_(*this, "memory", time_.mshrs,
                 at_once_ == 1 ? 1 : std::min(time_.cache.sectors_of_a_line(), time_.mshrs), time_.cache.sector_bytes,
                 dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics,
@@ -140,7 +139,8 @@ class TimedCrop : public TimedUnit {
       send(time_.flits_of_reads(warp, from, to, cache_, *behaviour_->surface()), looked_up.last);
       there = std::max(there, time_.port.open_from(there));
     } else if (const unsigned moved = memory_.take_moved(); moved > 0) {
-      moves_hide_ ? move_for_quads(warp, from, to, looked_up, moved) : moves_.push({looked_up.last, moved});
+      // Beside a quad of several cycles a sector may take nothing, so that each counts from its own time.
+      time_.quads_are_alike() ? moves_.push({looked_up.last, moved}) : move_for_quads(warp, from, to, looked_up, moved);
     }
 
     if (fetches_ahead) there = std::max(there, look_again(warp, from, looked_up.last));
@@ -362,7 +362,6 @@ class TimedCrop : public TimedUnit {
   const BarrierPlan barriers_;
   EffectGate hazard_gate_;
   const unsigned at_once_;  ///< quads looked up before the first of them is blended
-  const bool moves_hide_;   ///< behind quads of several cycles
   TimedCachePort memory_;
   std::unique_ptr<BlendOrderMonitor> monitor_;
   CropBehaviour::CacheLookUp cache_;
