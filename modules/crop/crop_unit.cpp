@@ -58,7 +58,6 @@ class CropUnit : public Unit {
   Cycle end_of_frame() const override { return end_; }
 
  private:
-  static constexpr std::size_t quads_ahead = 8;
   struct Entry {
     ColorQuad quad;
     SectoredCache::Line line = SectoredCache::no_line;  ///< or its stay (LinesAhead)
@@ -111,10 +110,19 @@ class CropUnit : public Unit {
     tile_place_ = surface_->grid().place(tile, 0);
     tile_address_ = surface_->address(tile_place_);
   }
+  /// For the host: what blending a quad will touch was last touched long ago. Inlined, since GCC drops calls of
+  /// functions that do nothing but prefetch.
+  [[gnu::always_inline]] void prefetch(const ColorQuad& quad, std::size_t place) const {
+    __builtin_prefetch(&surface_->quad(place), 1);
+    __builtin_prefetch(&quad.color());
+    if (quad.index == 0) __builtin_prefetch(&quad.warp->first_primitive);
+    monitor_->prefetch(place);
+  }
   [[gnu::always_inline]] Entry& queue(const ColorQuad& quad, std::uint32_t line, std::uint32_t sectors,
                                       std::size_t place) {
     // In place: a temporary of narrow stores would be waited for when it is copied.
     Entry& entry = queue_.push();
+    prefetch(quad, place);
     entry.quad = quad;
     entry.line = line;
     entry.sectors = sectors;
@@ -212,15 +220,6 @@ class CropUnit : public Unit {
     return moved;
   }
 
-  /// For the host: what blending a quad will touch was last touched long ago. Inlined, since GCC drops calls of
-  /// functions that do nothing but prefetch.
-  [[gnu::always_inline]] void prefetch(const Entry& entry) const {
-    __builtin_prefetch(&surface_->quad(entry.place), 1);
-    __builtin_prefetch(&entry.quad.color());
-    __builtin_prefetch(&entry.quad.warp->first_primitive[entry.quad.index]);
-    monitor_->prefetch(entry.place);
-  }
-
   /// Blends from the head of the queue; why it stopped is in `stop_`.
   bool blend(Cycle now) {
     const std::int64_t lost = time_.open(now);
@@ -229,9 +228,10 @@ class CropUnit : public Unit {
     opened_ = now;
     TerminationBeat beat;
     stop_ = UnitState::starved;
+    const bool marked = !marks_.empty();
     unsigned budget = time_.most_in_a_cycle;
     for (; budget > 0 && !queue_.empty(); --budget) {
-      if (!marks_.empty()) pass_marks(now);
+      if (marked) pass_marks(now);
       const Entry& entry = queue_.front();
       // In the same cycle a beat that is full may go before this one.
       if (signals_ && out_.credits() < (beat.count == TerminationBeat::capacity ? 2U : 1U)) {
@@ -255,8 +255,8 @@ class CropUnit : public Unit {
         break;
       }
       const ColorQuad& quad = entry.quad;
-      monitor_->blended(entry.place, *quad.warp, quad.index, now);
-      const CropBehaviour::Outcome outcome = behaviour_->blend_quad(entry.place, *quad.warp, quad.index);
+      if (quad.index == 0) blend_warp(*quad.warp, now);
+      const CropBehaviour::Outcome outcome = outcomes_[quad.index];
       if (outcome.terminated != 0) {
         if (beat.count == TerminationBeat::capacity) {
           out_.push(beat);
@@ -271,8 +271,7 @@ class CropUnit : public Unit {
       waits_from_ = never;
       leave(entry, outcome.changed || time_.writes_unchanged);
       queue_.pop();
-      if (!marks_.empty()) --marks_.front().quads;
-      if (queue_.size() > quads_ahead) prefetch(queue_[quads_ahead]);
+      if (marked && !marks_.empty()) --marks_.front().quads;
     }
     if (beat.count > 0) out_.push(beat);
     const unsigned blended = time_.most_in_a_cycle - budget;
@@ -282,6 +281,11 @@ class CropUnit : public Unit {
     did(CropWork::blend, blended, now);
     if (!Plain) tell_unpaired(time_.take_unpaired());
     return true;
+  }
+  /// What is stored nobody sees but the quads behind, so that those of a warp are blended when the first one's turn comes.
+  void blend_warp(const ShadedWarp& warp, Cycle now) {
+    monitor_->blended(warp, 0, warp.count, now);
+    behaviour_->blend_quads(warp, 0, warp.count, outcomes_);
   }
   [[gnu::noinline]] CropTime::Quad priced_quad(const Entry& entry) const {
     // A line may have become another tile's since.
@@ -384,8 +388,9 @@ class CropUnit : public Unit {
   std::optional<LinesAhead> ahead_;
   std::size_t looked_twice_ = 0;  ///< quads at the front of the queue
   VisitCounter visits_;
-  Cycle waits_from_ = never;  ///< the quad whose turn it is has waited for nothing but the blender
-  Cycle opened_ = 0;          ///< the blender, last
+  CropBehaviour::Outcomes outcomes_;  ///< of the warp whose quads' turn it is
+  Cycle waits_from_ = never;          ///< the quad whose turn it is has waited for nothing but the blender
+  Cycle opened_ = 0;                  ///< the blender, last
   UnitState stop_ = UnitState::starved;
   struct QueuedMark {
     Mark mark = Mark::none;
