@@ -115,6 +115,7 @@ class ZLinesAhead {
         again(id & number_mask);
         any = true;
       } else {
+        filling_ -= sizes_[(id - static_cast<std::uint32_t>(done_ + 1)) & id_mask];
         came_.push_back(id);
       }
     }
@@ -124,7 +125,6 @@ class ZLinesAhead {
          came_.end();) {
       came_.erase(found);
       ++done_;
-      filling_ -= sizes_.front();
       sizes_.pop();
       any = true;
     }
@@ -175,8 +175,9 @@ class ZLinesAhead {
     while (left != 0) {
       if (!may_read()) return false;
       ++asked_;
-      const unsigned count = read(wanted.address, left, static_cast<std::uint32_t>(asked_) & id_mask, moved);
-      sizes_.push(count);
+      const SectorRun run = take_run(left);
+      read(wanted.address, run, static_cast<std::uint32_t>(asked_) & id_mask, moved);
+      sizes_.push(run.count);
       read_of_line_[wanted.line] = asked_;
     }
     reads = std::max(reads, read_of_line_[wanted.line]);
@@ -203,8 +204,8 @@ class ZLinesAhead {
     while (left_again_ != 0) {
       if (!may_read()) return false;
       const std::uint32_t of = static_cast<std::uint32_t>(number) & number_mask;
-      const SectorRun run = next_run(left_again_);
-      read(line.address, left_again_, again_tag | (run.count - 1) << number_bits | of, moved);
+      const SectorRun run = take_run(left_again_);
+      read(line.address, run, again_tag | (run.count - 1) << number_bits | of, moved);
       ++waits.reads_again;
     }
     return true;
@@ -215,15 +216,15 @@ class ZLinesAhead {
     return lines_.in_halves(line.address, line.sectors);
   }
   bool may_read() const { return filling_ < mshrs_ && port_.memory_is_available(); }
-  SectorRun next_run(std::uint32_t sectors) const { return take_sector_run(sectors, sectors_of_a_line_); }
-  /// Takes the first of some sectors; returns how many.
+  /// Of some sectors, those that one access reads: as many as there are registers free.
+  SectorRun take_run(std::uint32_t& sectors) const {
+    return take_sector_run(sectors, std::min(sectors_of_a_line_, mshrs_ - filling_));
+  }
   template <class Moved>
-  unsigned read(std::uint64_t line, std::uint32_t& sectors, std::uint32_t id, Moved&& moved) {
-    const SectorRun run = take_sector_run(sectors, sectors_of_a_line_);
+  void read(std::uint64_t line, SectorRun run, std::uint32_t id, Moved&& moved) {
     port_.read_ahead(line + std::uint64_t{run.first} * sector_bytes_, run.count, id);
     filling_ += run.count;
     moved(run.count);
-    return run.count;
   }
 
   CachePort& port_;
@@ -238,7 +239,7 @@ class ZLinesAhead {
   // Reads of first looks are numbered from 1.
   std::uint64_t asked_ = 0;
   std::uint64_t done_ = 0;
-  Ring<unsigned> sizes_;                     ///< of those under way, sectors
+  Ring<unsigned> sizes_;                     ///< of those from `done_` on, sectors
   std::vector<std::uint32_t> came_;          ///< before others that were asked for earlier
   std::vector<std::uint64_t> read_of_line_;  ///< by line of the cache: the last for it
   std::uint32_t left_ = 0;                   ///< sectors of the line at a first look, yet to be read

@@ -267,6 +267,16 @@ TEST(SlotPool, WhatIsTakenLaterMayBeFreeEarlier) {
   EXPECT_EQ(pool.free_from(10, 2), 433U);
 }
 
+TEST(SlotPool, SaysHowManyAreFree) {
+  SlotPool pool(4);
+  pool.take(1, 100);
+  pool.take(2, 200);
+  EXPECT_EQ(pool.free_at(99, 4), 1U);
+  EXPECT_EQ(pool.free_at(100, 4), 2U);
+  EXPECT_EQ(pool.free_at(100, 1), 1U) << "no more than are asked for";
+  EXPECT_EQ(pool.free_at(200, 9), 4U) << "nor than there are";
+}
+
 TEST(CycleInterval, SpreadsPartsEvenly) {
   const CycleInterval dense(10, 13);
   EXPECT_EQ(dense.of_part(0, 4), 10U);

@@ -1,6 +1,7 @@
 // ZROP in front of a memory: its z-cache at cycle, by hand-computed timelines and against a cache by its definition.
 #include <deque>
 #include <map>
+#include <numeric>
 #include <set>
 
 #include <gtest/gtest.h>
@@ -235,6 +236,38 @@ TEST_F(ZCacheTest, MissRegistersThatAreAllTakenHoldTheNextLookUp) {
   ASSERT_EQ(zrop.memory.accesses.size(), 3U);
   EXPECT_EQ(zrop.memory.accesses[1].cycle, 111U) << "blocked in 110, free in 111";
   EXPECT_EQ(zrop.memory.accesses[2].cycle, 211U);
+}
+
+TEST_F(ZCacheTest, NoMoreSectorsAreOnTheirWayThanThereAreMissRegistersAlsoWhereTagsRunAhead) {
+  for (const char* ahead : {"0", "256"}) {
+    for (const unsigned registers : {1U, 2U, 3U, 8U}) {
+      SCOPED_TRACE(std::string(ahead) + " lines ahead, " + std::to_string(registers) + " registers");
+      ZBench zrop(context, {{"mshrs", std::to_string(registers)},
+                            {"fetch_ahead_lines", ahead},
+                            {"line_bytes", "512"},
+                            {"cache_bytes", "4096"}});
+      for (std::uint16_t tile = 0; tile < 4; ++tile) {
+        for (unsigned beat = 0; beat < 4; ++beat) {
+          std::vector<unsigned> positions(16);
+          std::iota(positions.begin(), positions.end(), 16 * beat);
+          QuadBeat rows = beat_of({tile, 0}, positions);
+          for (Quad& quad : rows.quads) quad.splat = 4U * tile + beat;  // a primitive's are looked up together
+          zrop.in.add(rows);
+        }
+      }
+      zrop.bench.run();
+      unsigned most = 0;
+      for (const NotingMemory::Access& access : zrop.memory.accesses) {
+        unsigned on_their_way = 0;
+        for (const NotingMemory::Access& other : zrop.memory.accesses) {
+          if (!other.written && other.cycle <= access.cycle && access.cycle < other.cycle + 100)
+            on_their_way += other.bytes / 32;
+        }
+        most = std::max(most, on_their_way);
+      }
+      EXPECT_EQ(most, registers);
+    }
+  }
 }
 
 TEST_F(ZCacheTest, AFullQueueHoldsTheNextLookUp) {

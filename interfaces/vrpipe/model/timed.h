@@ -128,6 +128,11 @@ class SlotPool {
     }
     return at;
   }
+  /// How many are free in a cycle, up to `most`.
+  unsigned free_at(Cycle at, unsigned most) {
+    for (; free_ < most && !taken_.empty() && taken_.front().last <= at; taken_.pop()) free_ += taken_.front().places;
+    return static_cast<unsigned>(std::clamp<std::int64_t>(free_, 0, most));
+  }
   /// Takes them, which `free_from` has said are free, until cycles that are spread over an interval.
   void take(unsigned places, CycleInterval until) {
     free_ -= places;

@@ -17,14 +17,11 @@ class TimedCachePort {
   /// @param mshrs        sectors that are filled at a time
   /// @param longest_run  sectors of an access at most
   /// @param statistics   of the cache; outlive it
-  /// @param overfills    an access goes as soon as one register is free, and takes more than there are; they come back in order
   TimedCachePort(TimedUnit& owner, const std::string& name, unsigned mshrs, unsigned longest_run, unsigned sector_bytes,
-                 SectoredCacheStatistics& statistics, MemoryOrigin origin, bool overfills = false)
+                 SectoredCacheStatistics& statistics, MemoryOrigin origin)
       : memory_(owner, name, origin),
         fills_(statistics),
-        // One register is free where, of as many more as an access may take, all are that it may take.
-        least_free_(overfills ? longest_run : 0),
-        mshrs_(mshrs + (overfills ? longest_run - 1 : 0)),
+        mshrs_(mshrs),
         longest_run_(longest_run),
         sector_shift_(static_cast<unsigned>(__builtin_ctz(sector_bytes))) {}
 
@@ -36,13 +33,14 @@ class TimedCachePort {
   template <class Filled>
   Cycle fill(const LineAccess& access, Cycle& at, Filled&& filled) {
     Cycle there = 0;
-    for_each_sector_run(access.filled, longest_run_, [&](unsigned sector, unsigned sectors) {
-      at = mshrs_.free_from(at, std::max(sectors, least_free_));
-      there = ask(access.address, sector, sectors, at);
-      returned_ = least_free_ > 0 ? std::max(returned_, there) : there;
-      mshrs_.take(sectors, returned_);
-      filled(sector, sectors, there);
-    });
+    // An access takes as many registers as are free, like CachePort's.
+    for (std::uint32_t missing = access.filled; missing != 0;) {
+      at = mshrs_.free_from(at, 1);
+      const SectorRun run = take_sector_run(missing, mshrs_.free_at(at, longest_run_));
+      there = ask(access.address, run.first, run.count, at);
+      mshrs_.take(run.count, there);
+      filled(run.first, run.count, there);
+    }
     return there;
   }
   Cycle fill(const LineAccess& access, Cycle& at) {
@@ -75,9 +73,7 @@ class TimedCachePort {
 
   TimedMemoryPort memory_;
   AnnotatedFillCounter fills_;
-  const unsigned least_free_;  ///< for an access to go; 0: what it takes
   SlotPool mshrs_;
-  Cycle returned_ = 0;  ///< registers, last
   const unsigned longest_run_;
   const unsigned sector_shift_;
   unsigned sectors_moved_ = 0;
