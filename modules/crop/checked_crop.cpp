@@ -25,11 +25,6 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
     take(draw, static_cast<unsigned>(place % positions_per_tile), live, outcome);
     return outcome;
   }
-  Outcome blend_quad(std::size_t place, const ShadedWarp& warp, unsigned index) override {
-    const Outcome outcome = ask("blend_quad", [&] { return checked_->blend_quad(place, warp, index); });
-    take(warp.draw[index], warp.position[index], warp.live[index], outcome);
-    return outcome;
-  }
   void blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) override {
     ask("blend_quads", [&] { checked_->blend_quads(warp, from, to, outcomes); });
     for (unsigned i = from; i < to; ++i) take(warp.draw[i], warp.position[i], warp.live[i], outcomes[i]);

@@ -61,13 +61,6 @@ class RunAhead::Record {
     forget();
     return changed;
   }
-  CropBehaviour::Outcome repeat(const ShadedWarp& warp, unsigned index) {
-    Entry& entry = find(warp.sequence);
-    const CropBehaviour::Outcome outcome = entry.outcomes[index];
-    --entry.left;
-    forget();
-    return outcome;
-  }
   void repeat(const ShadedWarp& warp, unsigned from, unsigned to, CropBehaviour::Outcomes& outcomes) {
     Entry& entry = find(warp.sequence);
     std::copy(entry.outcomes.begin() + from, entry.outcomes.begin() + to, outcomes.begin() + from);
@@ -165,9 +158,6 @@ class RunAhead::RepeatingCrop final : public CropBehaviour {
   void pass(Mark) override {}  ///< what is cleared was cleared ahead of time
   Outcome blend(DrawIndex, std::size_t, LaneMask, const QuadColor&) override {
     throw SimulationFault("crop", 0, "a quad was blended without its warp");
-  }
-  Outcome blend_quad(std::size_t, const ShadedWarp& warp, unsigned index) override {
-    return record_.repeat(warp, index);
   }
   void blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, CropBehaviour::Outcomes& outcomes) override {
     record_.repeat(warp, from, to, outcomes);

@@ -35,7 +35,7 @@ class MemoryUnit {
   /// At `lt`, which answers requests in the order of calls: whether it tells in which order they come. Not where none waits for
   /// another one; where few do, only if no unit is busy all the time, since it hides what memory takes.
   enum class Order : std::uint8_t { does_not_matter, is_hidden_by_units, matters };
-  /// After a run of so many cycles; for a memory that nothing else is busier than.
+  /// After a run of so many cycles. `is_bottleneck`: nothing else of the platform was busier.
   virtual Order order(Cycle /*end*/, bool is_bottleneck) const {
     return is_bottleneck ? Order::matters : Order::does_not_matter;
   }

@@ -7,28 +7,15 @@
 template <vrpipe::ColorFormat Format, vrpipe::BlendRounding Rounding>
 class CountingRop : public vrpipe::ColorRop<Format, Rounding> {
   using Shipped = vrpipe::ColorRop<Format, Rounding>;
-  using Outcome = vrpipe::CropBehaviour::Outcome;
   using Outcomes = vrpipe::CropBehaviour::Outcomes;
 
  public:
   using Shipped::Shipped;
 
-  // A quad comes by one of the two, at cycle by the first, elsewhere by the second.
-  Outcome blend(vrpipe::DrawIndex draw, std::size_t place, vrpipe::LaneMask live,
-                const vrpipe::QuadColor& color) override {
-    const Outcome outcome = Shipped::blend(draw, place, live, color);
-    count(outcome);
-    return outcome;
-  }
   void blend_quads(const vrpipe::ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) override {
     Shipped::blend_quads(warp, from, to, outcomes);
-    for (unsigned i = from; i < to; ++i) count(outcomes[i]);
+    for (unsigned i = from; i < to; ++i) quads_unchanged += outcomes[i].changed ? 0U : 1U;
   }
 
   vrpipe::Counter quads_unchanged{*this, "quads_unchanged", "quads", "blended, or dropped late, without a change"};
-
- private:
-  void count(const Outcome& outcome) {
-    if (!outcome.changed) ++quads_unchanged;
-  }
 };

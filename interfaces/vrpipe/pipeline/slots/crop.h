@@ -32,16 +32,13 @@ class CropBehaviour : public Behaviour {
   };
   /// Blends the live samples of a quad of a draw into the one at a place of the surface's grid.
   virtual Outcome blend(DrawIndex draw, std::size_t place, LaneMask live, const QuadColor& color) = 0;
-  /// The same for a quad of a warp, which timing models that blend quad by quad call.
-  virtual Outcome blend_quad(std::size_t place, const ShadedWarp& warp, unsigned index) {
-    return blend(warp.draw[index], place, warp.live[index], warp.color[index]);
-  }
   /// By quad of a warp.
   using Outcomes = std::array<Outcome, quads_per_warp>;
-  /// Blends quads `from` to `to` - 1 of a warp, in this order.
+  /// Blends quads `from` to `to` - 1 of a warp, in this order: what timing models call.
   virtual void blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) {
     for (unsigned i = from; i < to; ++i) {
-      outcomes[i] = blend_quad(surface_->grid().place(warp.tile, warp.position[i]), warp, i);
+      const std::size_t place = surface_->grid().place(warp.tile, warp.position[i]);
+      outcomes[i] = blend(warp.draw[i], place, warp.live[i], warp.color[i]);
     }
   }
 
