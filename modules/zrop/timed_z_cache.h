@@ -98,7 +98,8 @@ class TimedZCache {
       LineAccess access;
       access.line = cache_->find(changed.address);
       if (access.line == SectoredCache::no_line) {
-        // It went when another line of the same beat came.
+        // It went when another line of the same beat came, which may still be held fast.
+        if (pins_lines_) at = pins_.line_free_from(*cache_, changed.address, at);
         const unsigned sector_bytes = timing_.organization.sector_bytes;
         for_each_sector_run(changed.sectors, sectors_of_a_line_, [&](unsigned first, unsigned count) {
           access = cache_->access(changed.address + std::uint64_t{first} * sector_bytes, count * sector_bytes, true);

@@ -8,6 +8,7 @@
 
 #include "support/fidelities.h"
 #include "support/foreign_memory.h"
+#include "support/mixed_frames.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
@@ -276,6 +277,26 @@ TEST(DepthStencilTraffic, TakesAMemoryOfAnotherMake) {
     EXPECT_TRUE(same_image(result.framebuffer.color, expected.framebuffer.color)) << name_of(fidelity);
     EXPECT_EQ(result.counts.named(), expected.counts.named()) << name_of(fidelity);
     EXPECT_GT(statistic(result, "l2.depth_stencil_bytes_read"), 96U * 64 * 4) << name_of(fidelity);
+  }
+}
+
+/// What a beat changes may be of a line that went when another one of the same beat came, which is still held fast.
+TEST(DepthStencilTraffic, ACacheOfOneLineTakesChangesOfSeveral) {
+  const Platform platform = with_z_traffic();
+  for (const char* replacement : {"lru", "fifo", "random"}) {
+    for (const Fidelity fidelity : fidelities_with_time()) {
+      for (std::uint64_t seed = 0; seed < 6; ++seed) {
+        SCOPED_TRACE(std::string(replacement) + " " + name_of(fidelity) + " " + std::to_string(seed));
+        const RunRequest request = z_traffic_request(platform, "baseline", fidelity, [&](RunRequest& of) {
+          of.settings = {{"zrop", "cache_bytes", "128"}, {"zrop", "replacement", replacement}};
+        });
+        const Frame frame = testing::random_frame(seed, request);
+        const RunResult expected = run(request_of("baseline", Fidelity::functional), frame);
+        const RunResult result = run(request, frame);
+        EXPECT_TRUE(same_image(result.framebuffer.color, expected.framebuffer.color));
+        EXPECT_EQ(result.counts.named(), expected.counts.named());
+      }
+    }
   }
 }
 
