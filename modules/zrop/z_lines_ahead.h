@@ -105,15 +105,13 @@ class ZLinesAhead {
 
   /// Takes reads that have come; `again(number)` is called for each that a second look of a beat has asked for.
   template <class Again>
-  bool take_reads(Again&& again) {
-    bool any = false;
+  void take_reads(Again&& again) {
     std::uint32_t id = 0;
     while (port_.next_ahead(id)) {
       if ((id & again_tag) != 0) {
         const unsigned count = (id >> number_bits & 31U) + 1;
         filling_ -= count;
         again(id & number_mask);
-        any = true;
       } else {
         filling_ -= sizes_[(id - static_cast<std::uint32_t>(done_ + 1)) & id_mask];
         came_.push_back(id);
@@ -126,9 +124,7 @@ class ZLinesAhead {
       came_.erase(found);
       ++done_;
       sizes_.pop();
-      any = true;
     }
-    return any;
   }
   /// Whether a read of a first look has come.
   bool has_come(std::uint64_t read) const { return done_ >= read; }

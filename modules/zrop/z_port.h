@@ -69,7 +69,7 @@ class ZPort {
     if (plan_.is_used()) moved |= take_late(late);
     moved |= take_beats(quads);
     if (!ahead_) return read() || moved;
-    moved |= ahead_->take_reads([this](std::uint32_t number) {
+    ahead_->take_reads([this](std::uint32_t number) {
       --beats_[(number - static_cast<std::uint32_t>(beats_tested_)) & ZLinesAhead::number_mask].waits.reads_again;
     });
     return look_again() || moved;
