@@ -223,12 +223,25 @@ class TimedProp : public TimedUnit {
     ++on_late_way_;
     late_.hold(out_late_.send({next.warp}, at).first);
   }
-  /// What is not tested late goes on when nothing is on that way.
+  /// What is not tested late goes on when nothing is on that way, but for warps without quads, which are only released.
   bool leave_behind_late(bool is_mark) {
+    if (!is_mark && in_turn_.warp->count == 0) {
+      pass_over(std::exchange(in_turn_, {}));
+      return true;
+    }
     if (on_late_way_ > 0) return false;
     if (is_mark) return pass_mark();
     leave(std::exchange(in_turn_, {}));
     return true;
+  }
+  /// What is on the late way has taken the way to CROP already, for when it is back: it does not wait for that.
+  void pass_over(const ReorderBuffer::Waiting& empty) {
+    const Cycle at = std::max(empty.from, out_release_.room_from());
+    if (color_.taken_of(at) == 0) did(PropWork::empty_warps, time_.color_rate.items, at);
+    const WarpRelease release{empty.warp->slot};
+    empty.warp->release();
+    order_.leave(empty.turn, at);
+    out_release_.send(release, at);
   }
   /// What has been tested late, or has come around.
   Cycle take_back(const ShadedWarp& warp, Cycle visible) {

@@ -153,12 +153,13 @@ class PropUnit : public Unit {
   /// Whether there is a warp to hand to CROP.
   bool has_next() { return tests_late_ ? has_next_beside_late() : order_.has_next(); }
   [[gnu::noinline]] bool has_next_beside_late() {
-    if (on_late_way_ > 0) return in_late_.ready() && in_late_.front().warp->mark == Mark::none;
     if (in_turn_.warp == nullptr && order_.has_next()) in_turn_ = order_.take();
+    if (is_empty_in_turn()) return true;
+    if (on_late_way_ > 0) return in_late_.ready() && in_late_.front().warp->mark == Mark::none;
     return in_turn_.warp != nullptr && !is_late(*in_turn_.warp);
   }
   [[gnu::noinline]] ReorderBuffer::Waiting take_next() {
-    is_back_ = on_late_way_ > 0;
+    is_back_ = on_late_way_ > 0 && !is_empty_in_turn();
     if (!is_back_) return std::exchange(in_turn_, {});
     ReorderBuffer::Waiting back;
     back.warp = in_late_.front().warp;
@@ -166,6 +167,8 @@ class PropUnit : public Unit {
     --on_late_way_;
     return back;
   }
+  /// One without quads is only released, whatever is on the late way.
+  bool is_empty_in_turn() const { return in_turn_.warp != nullptr && in_turn_.warp->count == 0; }
   bool is_late(const ShadedWarp& warp) const { return warp.count > 0 && plan_.is_late(warp.draw[0]); }
 
   /// Sends warps to be tested late, and marks that wait for these.

@@ -153,6 +153,22 @@ TEST_P(LateProp, AWarpThatTheTestLeavesNothingOfIsPassedOverAndReleased) {
   EXPECT_TRUE(bench->unit().idle());
 }
 
+// Where a shader discards, warps with nothing left are as frequent as others.
+TEST_P(LateProp, AWarpWithoutQuadsDoesNotWaitForLateTestsOfThoseBeforeIt) {
+  make();
+  shaded->add(warp(0, 0, 0, 0), 10);
+  shaded->add(warp(1, 0, 1, 0, 0), 10);
+  shaded->add(warp(2, 0, 2, 0), 10);
+  bench->run();
+  EXPECT_EQ(sent, (Numbers{0, 2}));
+  EXPECT_LE(sent_at[1], sent_at[0] + 2) << "not when the first is back";
+  ASSERT_EQ(release->records().size(), 3U);
+  // At `lt` the first has taken the way to CROP already, for when it is back.
+  EXPECT_EQ(release->records()[0].item.slot, GetParam() == Fidelity::cycle ? 1U : 0U);
+  EXPECT_EQ(left, (Numbers{0, 2}));
+  EXPECT_TRUE(bench->unit().idle());
+}
+
 // A mark that nobody waits for, and what is not tested late, keep their place behind what is.
 TEST_P(LateProp, WhatIsNotTestedLateWaitsForWhatIs) {
   make();
