@@ -234,14 +234,13 @@ class TimedProp : public TimedUnit {
     leave(std::exchange(in_turn_, {}));
     return true;
   }
-  /// What is on the late way has taken the way to CROP already, for when it is back: it does not wait for that.
+  /// What is on the late way has taken the ways to CROP and SM already, for when it is back: it does not wait for that.
   void pass_over(const ReorderBuffer::Waiting& empty) {
-    const Cycle at = std::max(empty.from, out_release_.room_from());
-    if (color_.taken_of(at) == 0) did(PropWork::empty_warps, time_.color_rate.items, at);
+    if (color_.taken_of(empty.from) == 0) did(PropWork::empty_warps, time_.color_rate.items, empty.from);
     const WarpRelease release{empty.warp->slot};
     empty.warp->release();
-    order_.leave(empty.turn, at);
-    out_release_.send(release, at);
+    order_.leave(empty.turn, empty.from);
+    out_release_.send(release, empty.from, 0);
   }
   /// What has been tested late, or has come around.
   Cycle take_back(const ShadedWarp& warp, Cycle visible) {
