@@ -1,9 +1,10 @@
 // What `gh100-gpc` predicts of a draw that was measured on the GPU itself, beside the measurement.
-//   measured_gpu [--fidelity NAME] [--short] [--synthetic] [--uniform] [--in-shader]
+//   measured_gpu [--fidelity NAME] [--short] [--synthetic] [--uniform] [--in-shader] [--passes]
 // The draw is tests/data/measured_draw.spl.xz: 211,320 splats of a trained scene at 800x800, with boxes of its own. Cycles of
 // the GPU are of its clock, 1980 MHz (tests/data/README.md). Nothing of the platform was fitted to it. --short takes one
 // splat in two hundred, of which nothing was measured, to see that it works. --synthetic draws three scenes of
-// synthetic splats instead, --uniform splats of one size each, --in-shader both of these where the shader blends.
+// synthetic splats instead, --uniform splats of one size each, --in-shader both of these where the shader blends, --passes the
+// scenes, and the draw, with early termination by software.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -132,7 +133,7 @@ void compare_orders(const Gpu& gpu, const Draw& draw) {
 
 int main(int argc, char** argv) try {
   vrpipe::Fidelity fidelity = vrpipe::Fidelity::cycle;
-  bool is_short = false, is_synthetic = false, is_uniform = false, is_in_shader = false;
+  bool is_short = false, is_synthetic = false, is_uniform = false, is_in_shader = false, is_passes = false;
   for (int i = 1; i < argc; ++i) {
     if (std::strcmp(argv[i], "--short") == 0) {
       is_short = true;
@@ -142,6 +143,8 @@ int main(int argc, char** argv) try {
       is_uniform = true;
     } else if (std::strcmp(argv[i], "--in-shader") == 0) {
       is_in_shader = true;
+    } else if (std::strcmp(argv[i], "--passes") == 0) {
+      is_passes = true;
     } else if (std::strcmp(argv[i], "--fidelity") == 0 && i + 1 < argc) {
       fidelity = vrpipe::fidelity_named(argv[++i]);
     } else {
@@ -153,7 +156,8 @@ int main(int argc, char** argv) try {
   if (is_synthetic) vrpipe::measured::compare_scenes(gpu, is_short);
   if (is_uniform) vrpipe::measured::compare_uniform(gpu, is_short);
   if (is_in_shader) vrpipe::measured::compare_in_shader(gpu, is_short);
-  if (is_synthetic || is_uniform || is_in_shader) return 0;
+  if (is_passes) vrpipe::measured::compare_passes(gpu, is_short);
+  if (is_synthetic || is_uniform || is_in_shader || is_passes) return 0;
   const vrpipe::testing::UnpackedFile file("measured_draw.spl");
   vrpipe::Draw draw = vrpipe::read_draw_list(file.path()).draw;
   if (is_short) draw.splats.resize(draw.splats.size() / 200);

@@ -49,5 +49,7 @@ void compare_scenes(const Gpu& gpu, bool is_short);
 void compare_uniform(const Gpu& gpu, bool is_short);
 /// Blending in the shader, of equal splats and of draws. `is_short`: a part of a few.
 void compare_in_shader(const Gpu& gpu, bool is_short);
+/// Early termination by software, in passes, of draws. `is_short`: a part of one of them.
+void compare_passes(const Gpu& gpu, bool is_short);
 
 }  // namespace vrpipe::measured

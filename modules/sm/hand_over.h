@@ -66,9 +66,11 @@ class HandOver {
   /// Cycles: a few visits wait while warps go on. Assumed; only that it is more than a few warps' was seen.
   static constexpr Cycle most_visits_behind = 64;
 
+  /// Of a program without attributes discarding costs nothing more: it was measured, where it reads alpha (passes).
   bool discards(const Warp& warp) const {
-    return context_.state(warp.quads[0].draw).discards();
-  }  // all are of one state
+    const DrawState& state = context_.state(warp.quads[0].draw);  // all are of one state
+    return reads_attributes(state.shader) && state.discards();
+  }
   std::uint64_t of_warp(const Warp& warp) const {
     return price_.warp_thousandths + (discards(warp) ? price_.discard_warp_thousandths : 0);
   }

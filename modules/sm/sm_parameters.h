@@ -57,7 +57,7 @@ struct SmParameters : ParameterSet {
                              1000,
                              "cycles",
                              "left open by the paper; measured on a GH100 graphics GPC with 2 TPCs: 1.7",
-                             "on top of that, of a program that discards"};
+                             "on top of that, of a program with attributes that discards"};
   Real discard_warp_cycles{*this,
                            "discard_warp_cycles",
                            0,
@@ -65,7 +65,7 @@ struct SmParameters : ParameterSet {
                            1000,
                            "cycles",
                            "left open by the paper; measured on a GH100 graphics GPC with 2 TPCs: 1.03",
-                           "on top of warp_launch_cycles, of a program that discards"};
+                           "on top of warp_launch_cycles, of a program with attributes that discards"};
   Integer vertex_instructions{*this,        "vertex_instructions",
                               20,           1,
                               1000,         "instructions",

@@ -107,5 +107,14 @@ TEST_P(HandOverTest, ADrawThatDiscardsNothingPaysNoMoreThanItsVisits) {
   EXPECT_NEAR(cycles_of_a_warp({warp_of({1, 1, 1, 1, 1, 1, 1, 1})}, measured), 2.5, 0.02);
 }
 
+// As it was measured: full-screen draws of a shader that reads alpha and discards.
+TEST_P(HandOverTest, AProgramWithoutAttributesPaysNothingForWhatItDiscards) {
+  testing::change_state(context, [](DrawState& state) {
+    state = DrawState();
+    state.shader = FragmentShader::alpha_threshold;
+  });
+  EXPECT_NEAR(cycles_of_a_warp({warp_of({1, 1, 1, 1, 1, 1, 1, 1})}, measured), 2.5, 0.02);
+}
+
 }  // namespace
 }  // namespace vrpipe

@@ -19,6 +19,7 @@ std::vector<MeasuredScene> rows_of(const std::filesystem::path& path) {
     std::vector<std::string> cells;
     std::istringstream rest(line);
     for (std::string cell; std::getline(rest, cell, ',');) cells.push_back(cell);
+    if (!line.empty() && line.back() == ',') cells.emplace_back();
     return cells;
   };
   std::ifstream file(path);
@@ -81,5 +82,7 @@ std::vector<MeasuredScene> measured_in_shader_scenes() {
   }
   return scenes;
 }
+
+std::vector<MeasuredScene> measured_passes() { return rows_of(data_file("measured_passes.csv")); }
 
 }  // namespace vrpipe::testing

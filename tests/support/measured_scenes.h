@@ -29,4 +29,7 @@ std::vector<MeasuredScene> measured_uniform_scenes();
 /// pixels, and draws, of which the trained scene is not made here.
 std::vector<MeasuredScene> measured_in_shader_scenes();
 
+/// What was drawn in passes (tests/data/measured_passes.csv: counts, and millions of cycles), by scene, without the draws.
+std::vector<MeasuredScene> measured_passes();
+
 }  // namespace vrpipe::testing

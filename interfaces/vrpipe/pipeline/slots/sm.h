@@ -41,7 +41,7 @@ struct AttributeFetch {
 struct HandOverPrice {
   std::uint32_t warp_thousandths = 0;
   std::uint32_t visit_thousandths = 0;         ///< of a primitive's quads in a screen tile, one after the other
-  std::uint32_t discard_thousandths = 0;       ///< on top of a visit, of a program that discards
+  std::uint32_t discard_thousandths = 0;       ///< on top of a visit, of a program with attributes that discards
   std::uint32_t discard_warp_thousandths = 0;  ///< on top of a warp, of such a program
   bool is_on() const {
     return (warp_thousandths | visit_thousandths | discard_thousandths | discard_warp_thousandths) != 0;
