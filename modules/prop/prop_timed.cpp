@@ -212,6 +212,7 @@ class TimedProp : public TimedUnit {
   }
   void send_late(const ReorderBuffer::Waiting next, bool is_mark) {
     const unsigned quads = next.warp->count;
+    late_.hold(passed_over_);
     const Cycle at = late_.take(std::max({next.from, out_late_.room_from(), out_late_.last()}), std::max(quads, 1U));
     if (is_mark) {
       order_.leave_mark();
@@ -234,13 +235,15 @@ class TimedProp : public TimedUnit {
     leave(std::exchange(in_turn_, {}));
     return true;
   }
-  /// What is on the late way has taken the ways to CROP and SM already, for when it is back: it does not wait for that.
+  /// One a cycle. What is on the late way has taken the ways to CROP and SM already, for when it is back: it does not wait for
+  /// that.
   void pass_over(const ReorderBuffer::Waiting& empty) {
-    if (color_.taken_of(empty.from) == 0) did(PropWork::empty_warps, time_.color_rate.items, empty.from);
+    passed_over_ = std::max({empty.from, passed_over_ + 1, out_late_.last()});
+    if (color_.taken_of(passed_over_) == 0) did(PropWork::empty_warps, time_.color_rate.items, passed_over_);
     const WarpRelease release{empty.warp->slot};
     empty.warp->release();
-    order_.leave(empty.turn, empty.from);
-    out_release_.send(release, empty.from, 0);
+    order_.leave(empty.turn, passed_over_);
+    out_release_.send(release, passed_over_, 0);
   }
   /// What has been tested late, or has come around.
   Cycle take_back(const ShadedWarp& warp, Cycle visible) {
@@ -274,6 +277,7 @@ class TimedProp : public TimedUnit {
   // In a frame with late tests:
   IssuePort late_;
   ReorderBuffer::Waiting in_turn_;  ///< the warp whose turn it is to go either way; none without a warp
+  Cycle passed_over_ = 0;           ///< the last warp without quads
   unsigned on_late_way_ = 0;        ///< warps and marks that were sent to be tested late and are not back
   bool is_leaving_ = false;         ///< while what is in turn is sent, when it may come back at once
 };

@@ -261,6 +261,36 @@ TEST_P(MultiPassBarrier, NoWarpThatReadsIsLaunchedBeforeTheLastBlendBeforeItAndN
   }
 }
 
+class TimeBetweenPasses : public ::testing::TestWithParam<std::string> {
+ protected:
+  static constexpr std::uint32_t side = 256;
+  /// Of the draw between two batches: of splats, and of as many that nobody sees.
+  Cycle time(Fidelity fidelity, const std::vector<Splat>& splats) const {
+    Draw draw = testing::draw_of(side, side, splats);
+    draw.splats.resize(2 * splats.size(), testing::round_splat(1, 1, 0.5F, 0.1F));
+    RunRequest request = request_of("baseline", fidelity);
+    request.platform = &platform_named(GetParam());
+    return *run_passes(request, draw, 2).draws.at(1).cycles;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Frame, TimeBetweenPasses, ::testing::Values("agx-orin", "gh100-gpc", "desktop"),
+                         [](const auto& each) { return each.param.substr(0, each.param.find('-')); });
+
+// Many warps then have quads left and many have none, which need not wait for the others' late tests. A real GPU takes as
+// long whatever has terminated (tests/data/measured_passes.csv).
+TEST_P(TimeBetweenPasses, DependsLittleOnWhatHasTerminated) {
+  std::vector<Splat> dots, none;
+  for (std::uint64_t i = 0; i < 3000; ++i) {
+    const float x = testing::uniform(1, 2 * i, 0, side), y = testing::uniform(1, 2 * i + 1, 0, side);
+    for (unsigned layer = 0; layer < 3; ++layer) dots.push_back(testing::flat_box(x - 2, y - 2, x + 2, y + 2, 0.99F));
+  }
+  none.resize(dots.size(), testing::round_splat(1, 1, 0.5F, 0.1F));
+  const auto cycles = static_cast<double>(time(Fidelity::cycle, dots));
+  EXPECT_LT(cycles, 1.5 * static_cast<double>(time(Fidelity::cycle, none)));
+  // Of the z-cache lt does not see what has gone between look-up and change.
+  EXPECT_NEAR(static_cast<double>(time(Fidelity::lt, dots)), cycles, 0.1 * cycles);
+}
+
 TEST(MultiPass, APlatformOnWhichCropTellsDrawNothingIsRefusedAtEveryFidelity) {
   Platform unlinked = platform_named("agx-orin-ideal-memory");
   unlinked.wire = [wire = unlinked.wire](Netlist& netlist) {
