@@ -336,7 +336,7 @@ class TimedCrop : public TimedUnit {
   /// With those of the warp before that are of the same cycle.
   void send(const TerminationBeat& beat, Cycle cycle) {
     const bool joins = cycle == signalled_at_ && signalled_ + beat.count <= TerminationBeat::capacity;
-    out_.send(beat, joins ? std::max(cycle, out_.last()) : cycle, joins ? 0 : 1);
+    out_.send(beat, joins ? std::max(cycle, out_.last()) : cycle, joins ? 0 : 1, joins);
     signalled_ = beat.count + (joins ? signalled_ : 0);
     signalled_at_ = cycle;
   }

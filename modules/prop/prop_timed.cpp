@@ -243,7 +243,7 @@ class TimedProp : public TimedUnit {
     const WarpRelease release{empty.warp->slot};
     empty.warp->release();
     order_.leave(empty.turn, passed_over_);
-    out_release_.send(release, passed_over_, 0);
+    out_release_.send_beside(release, passed_over_);
   }
   /// What has been tested late, or has come around.
   Cycle take_back(const ShadedWarp& warp, Cycle visible) {

@@ -195,7 +195,9 @@ class TimedZCache {
       times.has_come = true;
     }
     if (access.filled != 0) {
-      send(access.address, access.filled, cache_->present(access.line) & ~access.filled, times.at);
+      if (const unsigned flits = flits_of(access.address, access.filled, cache_->present(access.line) & ~access.filled);
+          flits > 0)
+        times.at = out_reads_.send({flits}, times.at).first;
       const Cycle filled = port_.fill(access, times.at, [&](unsigned first, unsigned count, Cycle cycle) {
         std::fill_n(there + first, count, cycle);
       });
@@ -223,7 +225,8 @@ class TimedZCache {
                                .look_again(visit, lines_->in_halves(needed.address, needed.sectors), half(), at)
                                .again;
       if (again.filled == 0) continue;
-      send(needed.address, again.filled, 0, at);
+      // First looks of later beats may be long before.
+      if (const unsigned flits = flits_of(needed.address, again.filled, 0); flits > 0) out_reads_.send_beside({flits}, at);
       there = std::max(there, port_.fill(again, at));
     }
     second_looks_.hold(at);
@@ -233,10 +236,8 @@ class TimedZCache {
   }
   unsigned half() const { return timing_.organization.sectors_of_a_half(); }
   /// What reading sectors takes of the ROPs' port.
-  void send(std::uint64_t line, std::uint32_t sectors, std::uint32_t held, Cycle& at) {
-    if (out_reads_.is_stub()) return;
-    if (const unsigned flits = lines_->flits_of(line, sectors, held); flits > 0)
-      at = out_reads_.send({flits}, at).first;
+  unsigned flits_of(std::uint64_t line, std::uint32_t sectors, std::uint32_t held) const {
+    return out_reads_.is_stub() ? 0 : lines_->flits_of(line, sectors, held);
   }
   /// When all of these sectors are there; 0 for none.
   Cycle all_there(SectoredCache::Line line, std::uint32_t sectors) const {

@@ -34,12 +34,17 @@ class Sender : public Plain {
   std::vector<CycleInterval> at;     ///< of each item
   std::vector<unsigned> beats;       ///< of each item; 1 where there is none
   std::vector<bool> joins;           ///< of each item; false where there is none
+  std::vector<bool> goes_beside;     ///< of each item: out of order; false where there is none
   std::vector<CycleInterval> taken;  ///< as known when it was sent
 
  private:
   Cycle tick(Cycle) override {
     while (sent_ < at.size()) {
       const CycleInterval when = at[sent_];
+      if (sent_ < goes_beside.size() && goes_beside[sent_]) {
+        out.send_beside(static_cast<int>(sent_++), when);
+        continue;
+      }
       const bool joins_last = sent_ < joins.size() && joins[sent_];
       const Cycle earliest = std::max(when.first, sent_ == 0 ? 0 : out.last() + (joins_last ? 0 : 1));
       taken.push_back(out.send(static_cast<int>(sent_), {earliest, earliest + (when.last - when.first)},
@@ -175,6 +180,15 @@ TEST_P(TimedLink, WhatJoinsTheItemBeforeTakesNothingOfALinksRate) {
   clock.run(sc_core::sc_time(1, sc_core::SC_US));
   EXPECT_EQ(firsts(taker.came), (std::vector<Cycle>{11, 14, 18}));
   EXPECT_EQ(taker.came[1].last, 17U);
+}
+
+// As what is sent for a second look at a tag, long after the first looks of others that are sent later.
+TEST_P(TimedLink, WhatGoesBesideTheQueueNeitherWaitsNorIsWaitedFor) {
+  TimedPair pair(GetParam(), 2, 1, 1);
+  pair.sender->at = {10, 500, 501, 12, 11};
+  pair.sender->goes_beside = {false, true, true, false, true};
+  pair.run();
+  EXPECT_EQ(firsts(pair.taker->came), (std::vector<Cycle>{11, 501, 502, 13, 12}));
 }
 
 TEST_P(TimedLink, ABatchLargerThanTheQueuePassesAllTheSame) {

@@ -1,11 +1,15 @@
 // The z-cache of ZROP, connected to memory: on whole frames, at every fidelity.
 
+#include <map>
+
 #include <gtest/gtest.h>
 
 #include <vrpipe/platforms/foreign_memory.h>
 #include <vrpipe/platforms/wiring.h>
+#include <vrpipe/workloads/draw_list.h>
 #include <vrpipe/workloads/scene.h>
 
+#include "support/data.h"
 #include "support/fidelities.h"
 #include "support/foreign_memory.h"
 #include "support/mixed_frames.h"
@@ -301,6 +305,24 @@ TEST(DepthStencilTraffic, ACacheOfOneLineTakesChangesOfSeveral) {
       }
     }
   }
+}
+
+// Of a real GPU's draw; at lt flits of second looks, which come later, held up the first looks behind them.
+TEST(DepthStencilTraffic, TagsAreLookedAtAsFarAheadAtLtAsAtCycle) {
+  const testing::UnpackedFile file("measured_draw.spl");
+  const Draw draw = read_draw_list(file.path()).draw;
+  std::map<Fidelity, double> reads;
+  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::cycle}) {
+    RunRequest request = request_of("baseline", fidelity);
+    request.platform = &platform_named("gh100-gpc");
+    DrawState state = draw_state_of(request);
+    state.stencil.test = true;
+    state.stencil.front.compare = state.stencil.back.compare = Compare::none;
+    Frame frame(draw.width, draw.height);
+    frame.draw(geometry_of(draw.width, draw.height, draw.splats), state, "", 100'000, 1500);
+    reads[fidelity] = static_cast<double>(statistic(run(request, frame), "l2.depth_stencil_reads"));
+  }
+  EXPECT_NEAR(reads[Fidelity::lt], reads[Fidelity::cycle], 0.03 * reads[Fidelity::cycle]);
 }
 
 TEST(DepthStencilTraffic, MayStayUnconnected) {

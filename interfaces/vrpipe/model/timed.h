@@ -180,7 +180,8 @@ class TimedOut : public OutEnd<Item> {
   void connect(InPort& in, const LinkOptions& options) override;
 
   /// Sends an item whose parts are there in the cycles `at`, and which takes the link for so many. `joins`: its first part
-  /// goes with the last one of the item before it, beside which it takes the link. Returns the cycles in which it is taken.
+  /// goes with the last one of the item before it, beside which it takes the link; with 0 beats all of it. Returns the cycles in
+  /// which it is taken.
   CycleInterval send(const Item& item, CycleInterval at, unsigned beats = 1, bool joins = false) {
     if (this->limited_) at = limited(at, beats, joins);
     ++this->transferred_;
@@ -188,6 +189,12 @@ class TimedOut : public OutEnd<Item> {
                             : call(item, at, beats, joins);
     last_ = at.last;
     return at;
+  }
+  /// Sends an item out of the order of time, which takes no place of the queue: it neither waits for others, nor do they for it.
+  void send_beside(const Item& item, CycleInterval at) {
+    if (this->limited_) at = limited(at, 0, false);
+    ++this->transferred_;
+    direct_ != nullptr ? direct_->offer(item, at, 0, false, this->pipeline_.cycles) : call(item, at, 0, false);
   }
   /// The cycle in which the last part of the last item was taken.
   Cycle last() const { return last_; }
@@ -343,8 +350,9 @@ class TimedIn : public InEnd<Item> {
     if (take_) return offer_parts(item, at, beats, pipeline);
     std::size_t place = place_;
     if (beats == 0) {
+      const Cycle left = handler_(item, visible(at, pipeline)).last;
       Cycle& free_at = free_at_[place == 0 ? depth_ - 1 : place - 1];
-      free_at = std::max(free_at, handler_(item, visible(at, pipeline)).last + 1);
+      if (joins) free_at = std::max(free_at, left + 1);
       return at;
     }
     if (joins) {
