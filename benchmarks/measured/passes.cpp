@@ -43,7 +43,8 @@ void print(double measured, double predicted, int digits) {
 }  // namespace
 
 void compare_passes(const Gpu& gpu, bool is_short) {
-  std::printf("%-10s%7s%27s%27s%17s%27s\n", "", "", "fragments, M     ", "cycles, M     ", "other target", "between alone   ");
+  std::printf("%-10s%7s%27s%27s%17s%27s\n", "", "", "fragments, M     ", "cycles, M     ", "other target",
+              "between alone   ");
   std::printf("%-10s%7s", "scene", "passes");
   std::printf("%10s%10s%7s%10s%10s%7s%10s%7s%10s%10s%7s\n", "measured", "counted", "%", "measured", "predicted", "%",
               "measured", "%", "measured", "predicted", "%");

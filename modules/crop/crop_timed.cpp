@@ -5,6 +5,7 @@
 
 #include "crop/crop_time.h"
 #include "crop/in_shader.h"
+#include "crop/timed_flit_port.h"
 
 #include <vrpipe/memory/line_visits.h>
 #include <vrpipe/model/timed_cache_port.h>
@@ -228,11 +229,11 @@ class TimedCrop : public TimedUnit {
     if (parts > 0) did(CropWork::unpaired, static_cast<std::uint64_t>(parts), at);
   }
   /// From when on the port takes more, by what was sent before: lines are written back when quads are blended, which is long
-  /// after the look-ups of those behind them.
+  /// after the look-ups of those behind them. What ZROP reads for quads that come later is known late.
   Cycle port_open_from(Cycle at) {
     while (true) {
       for (; !sent_.empty() && sent_.front().at <= at; sent_.pop())
-        sent_before_.take(sent_.front().flits, sent_.front().at);
+        sent_before_.take(sent_.front().flits, sent_.front().at, clock.domain->now());
       const Cycle open = sent_before_.open_from(at);
       if (open == at) return at;
       at = open;
@@ -357,8 +358,8 @@ class TimedCrop : public TimedUnit {
     Cycle at = 0;
     unsigned flits = 0;
   };
-  Ring<Sent> sent_;       ///< to the port, later than the last look-up
-  FlitPort sent_before_;  ///< what was sent before it
+  Ring<Sent> sent_;            ///< to the port, later than the last look-up
+  TimedFlitPort sent_before_;  ///< what was sent before it
   const BarrierPlan barriers_;
   EffectGate hazard_gate_;
   const unsigned at_once_;  ///< quads looked up before the first of them is blended

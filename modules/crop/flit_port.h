@@ -16,6 +16,8 @@ class FlitPort {
   /// @param per_cycle  flits; 0: there is no port, and nobody waits
   FlitPort(unsigned per_cycle, std::uint32_t backlog) : per_cycle_(per_cycle), backlog_(backlog) {}
   bool is_on() const { return per_cycle_ > 0; }
+  unsigned per_cycle() const { return static_cast<unsigned>(per_cycle_); }
+  std::uint32_t backlog() const { return static_cast<std::uint32_t>(backlog_); }
   double cycles_of_a_flit() const { return is_on() ? 1.0 / static_cast<double>(per_cycle_) : 0; }
   /// The first cycle from one on in which its backlog takes more.
   Cycle open_from(Cycle cycle) const {

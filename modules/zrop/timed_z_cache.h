@@ -226,7 +226,8 @@ class TimedZCache {
                                .again;
       if (again.filled == 0) continue;
       // First looks of later beats may be long before.
-      if (const unsigned flits = flits_of(needed.address, again.filled, 0); flits > 0) out_reads_.send_beside({flits}, at);
+      if (const unsigned flits = flits_of(needed.address, again.filled, 0); flits > 0)
+        out_reads_.send_beside({flits}, at);
       there = std::max(there, port_.fill(again, at));
     }
     second_looks_.hold(at);

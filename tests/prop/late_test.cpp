@@ -164,7 +164,9 @@ TEST_P(LateProp, AWarpWithoutQuadsDoesNotWaitForLateTestsOfThoseBeforeIt) {
   EXPECT_LE(sent_at[1], sent_at[0] + 2) << "not when the first is back";
   ASSERT_EQ(release->records().size(), 3U);
   // At `lt` a sink takes in the order of the calls.
-  if (GetParam() == Fidelity::cycle) { EXPECT_EQ(release->records()[0].item.slot, 1U); }
+  if (GetParam() == Fidelity::cycle) {
+    EXPECT_EQ(release->records()[0].item.slot, 1U);
+  }
   EXPECT_EQ(left, (Numbers{0, 2}));
   EXPECT_TRUE(bench->unit().idle());
 }
