@@ -17,7 +17,7 @@ Cycle next_word(Cycle cycle) { return (cycle / 64 + 1) * 64; }
 }  // namespace
 
 void BandwidthReservation::forget_before(Cycle cycle) {
-  const Cycle until = std::min(cycle, kept_from_ + kept_cycles());
+  const Cycle until = std::min(cycle, kept_until());
   for (Cycle word = kept_from_; word < until; word += 64) word_of(word) = {};
   kept_from_ = cycle;
 }
@@ -26,13 +26,12 @@ void BandwidthReservation::make_room(Cycle until, Cycle present) {
   const Cycle first = oldest(present) / 64 * 64;
   if (first > kept_from_) forget_before(first);
   std::size_t words = words_.size();
-  while (until > kept_from_ + 64 * words) words *= 2;
-  // So that it is not looked at again each time.
-  if (2 * (until - kept_from_) > 64 * words) words *= 2;
+  // Twice what it takes, so that it is not looked at again each time.
+  while (64 * words < most_cycles && 2 * (until - kept_from_) > 64 * words) words *= 2;
   if (words == words_.size()) return;
   std::vector<Word> more(words);
   std::vector<std::uint32_t> used_bytes(used_.empty() ? 0 : 64 * words);
-  for (Cycle word = kept_from_; word < kept_from_ + kept_cycles(); word += 64) {
+  for (Cycle word = kept_from_; word < kept_until(); word += 64) {
     more[word / 64 & (words - 1)] = word_of(word);
     if (!used_.empty()) std::copy_n(&used(word), 64, &used_bytes[word & (64 * words - 1)]);
   }
@@ -48,11 +47,11 @@ void BandwidthReservation::fill(Cycle from, Cycle to) {
 }
 
 void BandwidthReservation::begin_run(Cycle arrival, Cycle present) {
-  if (arrival > kept_from_ + kept_cycles()) make_room(arrival, present);
+  if (arrival > kept_until()) make_room(arrival, present);
   const Cycle whole = per_cycle_.quotient(end_);
-  fill(std::max(run_begin_, kept_from_), whole);
+  fill(std::max(run_begin_, kept_from_), std::min(whole, kept_until()));
   const auto rest = static_cast<std::uint32_t>(end_ - whole * per_cycle_.value());
-  if (rest > 0 && whole >= kept_from_) {
+  if (rest > 0 && whole >= kept_from_ && whole < kept_until()) {
     used(whole) = rest;
     word_of(whole).partial |= bits(whole, whole + 1);
   }
@@ -64,9 +63,10 @@ Cycle BandwidthReservation::take_gaps(Cycle arrival, unsigned bytes, Cycle prese
   const std::uint64_t width = per_cycle_.value();
   std::uint64_t left = bytes;
   Cycle taken_until = std::max({arrival, oldest(present), kept_from_});
-  for (Cycle cycle = taken_until; cycle < run_begin_; cycle = next_word(cycle)) {
+  const Cycle until = std::min(run_begin_, kept_until());
+  for (Cycle cycle = taken_until; cycle < until; cycle = next_word(cycle)) {
     Word& word = word_of(cycle);
-    std::uint64_t open = ~word.full & bits(cycle, std::min(run_begin_, next_word(cycle)));
+    std::uint64_t open = ~word.full & bits(cycle, std::min(until, next_word(cycle)));
     while (open != 0) {
       const auto first = static_cast<unsigned>(__builtin_ctzll(open));
       const std::uint64_t bit = std::uint64_t{1} << first;
@@ -90,6 +90,7 @@ Cycle BandwidthReservation::take_gaps(Cycle arrival, unsigned bytes, Cycle prese
       open &= ~word.full;
     }
   }
+  if (until < run_begin_) return std::max(arrival, until) + per_cycle_.quotient_up(left);
   no_gap_from_ = std::min(taken_until, run_begin_);
   end_ += left;
   return arrival + per_cycle_.quotient_up(end_ - arrival * width);
@@ -111,6 +112,7 @@ std::uint64_t BandwidthReservation::reserved_between(Cycle from, Cycle to) const
     reserved += (std::min(to, kept_from_) - std::min(from, to)) * per_cycle_.value();
     from = kept_from_;
   }
+  to = std::min(to, kept_until());
   for (Cycle cycle = from; cycle < to; cycle = next_word(cycle)) {
     const std::uint64_t asked = bits(cycle, std::min(to, next_word(cycle)));
     const Word& word = word_of(cycle);

@@ -127,6 +127,23 @@ TEST(BandwidthReservation, KeepsNoMoreThanCanBeAskedFor) {
   EXPECT_LE(most, 1024U);
 }
 
+// As with a clock of an L2 that is ten thousand times slower than that of the DRAM behind it.
+TEST(BandwidthReservation, WhatIsFarAheadOfEverythingTakesNoRoom) {
+  constexpr Cycle far = Cycle{1} << 34U;
+  for (const unsigned width : {1U, 32U}) {
+    BandwidthReservation bandwidth(width);
+    EXPECT_EQ(bandwidth.take(5, 3 * width, 0), 8U);
+    for (Cycle ahead = far; ahead < 8 * far; ahead += far) {
+      EXPECT_EQ(bandwidth.take(ahead, width, 0), ahead + 1);
+      EXPECT_EQ(bandwidth.take(ahead, width, 0), ahead + 2) << "the furthest are a queue";
+    }
+    EXPECT_LE(bandwidth.kept_cycles(), BandwidthReservation::most_cycles);
+    EXPECT_EQ(bandwidth.take(5, width, 0), 9U);
+    EXPECT_EQ(bandwidth.take(far, 2 * width, 0), far + 2) << "that it was taken is forgotten";
+    EXPECT_EQ(bandwidth.reserved_between(0, far), 4U * width);
+  }
+}
+
 TEST(BandwidthReservation, AnAccessFromBeforeWhatItRemembersWaitsAndTakesNothingTwice) {
   BandwidthReservation bandwidth(64);
   bandwidth.take(0, 32, 0);

@@ -16,12 +16,14 @@ namespace vrpipe {
 /// cycle are kept as bytes.
 ///
 /// What is reserved is kept by cycle, from the first that anybody can ask for up to the last run of reservations without a gap
-/// (compare the history lists of Graphite and Sniper, which keep a fixed number).
+/// (compare the history lists of Graphite and Sniper, which keep a fixed number), but for what is `most_cycles` ahead of that: it
+/// is free again for others once something still later is reserved.
 class BandwidthReservation {
  public:
   /// Few ask for cycles further back from the present: what has waited for its time (timed_memory_port.h). They find what
   /// lies further back taken.
   static constexpr Cycle remembered_cycles = 64;
+  static constexpr Cycle most_cycles = Cycle{1} << 22U;
 
   /// @param bytes_per_cycle not 0
   explicit BandwidthReservation(unsigned bytes_per_cycle)
@@ -53,6 +55,7 @@ class BandwidthReservation {
   [[gnu::noinline]] void make_room(Cycle until, Cycle present);
   void forget_before(Cycle cycle);
   void fill(Cycle from, Cycle to);
+  Cycle kept_until() const { return kept_from_ + kept_cycles(); }
   static Cycle oldest(Cycle present) { return present - (present < remembered_cycles ? present : remembered_cycles); }
   /// Of 64 cycles.
   struct Word {
@@ -68,7 +71,7 @@ class BandwidthReservation {
   std::uint64_t end_ = 0;  ///< in bytes from the start of time: of the furthest reservation
   Cycle run_begin_ = 0;    ///< of the reservations up to it that leave no gap
   Cycle no_gap_from_ = 0;  ///< from here to the furthest reservation nothing is free; at most `run_begin_`
-  Cycle kept_from_ = 0;    ///< cycles from here to `run_begin_` are kept; a multiple of 64
+  Cycle kept_from_ = 0;    ///< cycles from here to `run_begin_` are kept, `most_cycles` at most; a multiple of 64
   // Rings, by cycle. Beyond `run_begin_` words are 0.
   std::vector<Word> words_ = std::vector<Word>(16);
   std::size_t last_word_ = 15;       ///< of the ring, whose size is a power of two
