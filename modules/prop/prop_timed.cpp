@@ -68,7 +68,7 @@ class TimedProp : public TimedUnit {
     if (!plan_.is_used()) out_release_.on_asked([this](Cycle until) { leave_until(until); });
   }
 
-  bool idle() const override { return order_.empty() && in_turn_.warp == nullptr && on_late_way_ == 0; }
+  bool idle() const override { return order_.empty() && on_late_way_ == 0; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
@@ -201,13 +201,12 @@ class TimedProp : public TimedUnit {
     is_leaving_ = false;
   }
   bool leave_one_beside_late() {
-    if (in_turn_.warp == nullptr && order_.has_next()) in_turn_ = order_.take();
-    const bool is_mark = in_turn_.warp == nullptr;
-    const ReorderBuffer::Waiting* const next = is_mark ? order_.next_mark() : &in_turn_;
+    const bool is_mark = !order_.has_next();
+    const ReorderBuffer::Waiting* const next = is_mark ? order_.next_mark() : &order_.next();
     if (next == nullptr) return false;
     const bool goes_late = is_mark ? plan_.waits_at(next->warp->mark) : is_late(*next->warp);
     if (!goes_late) return leave_behind_late(is_mark);
-    send_late(*next, is_mark);
+    send_late(is_mark ? *next : order_.take(), is_mark);
     return true;
   }
   void send_late(const ReorderBuffer::Waiting next, bool is_mark) {
@@ -218,7 +217,6 @@ class TimedProp : public TimedUnit {
       order_.leave_mark();
     } else {
       did(PropWork::late, quads, at, at + (quads + time_.quads_per_cycle - 1) / time_.quads_per_cycle);
-      in_turn_.warp = nullptr;
       order_.leave(next.turn, at);
     }
     ++on_late_way_;
@@ -226,13 +224,13 @@ class TimedProp : public TimedUnit {
   }
   /// What is not tested late goes on when nothing is on that way, but for warps without quads, which are only released.
   bool leave_behind_late(bool is_mark) {
-    if (!is_mark && in_turn_.warp->count == 0) {
-      pass_over(std::exchange(in_turn_, {}));
+    if (!is_mark && order_.next().warp->count == 0) {
+      pass_over(order_.take());
       return true;
     }
     if (on_late_way_ > 0) return false;
     if (is_mark) return pass_mark();
-    leave(std::exchange(in_turn_, {}));
+    leave(order_.take());
     return true;
   }
   /// One a cycle. What is on the late way has taken the ways to CROP and SM already, for when it is back: it does not wait for
@@ -276,10 +274,9 @@ class TimedProp : public TimedUnit {
   const unsigned beats_a_cycle_;
   // In a frame with late tests:
   IssuePort late_;
-  ReorderBuffer::Waiting in_turn_;  ///< the warp whose turn it is to go either way; none without a warp
-  Cycle passed_over_ = 0;           ///< the last warp without quads
-  unsigned on_late_way_ = 0;        ///< warps and marks that were sent to be tested late and are not back
-  bool is_leaving_ = false;         ///< while what is in turn is sent, when it may come back at once
+  Cycle passed_over_ = 0;     ///< the last warp without quads
+  unsigned on_late_way_ = 0;  ///< warps and marks that were sent to be tested late and are not back
+  bool is_leaving_ = false;   ///< while what is in turn is sent, when it may come back at once
 };
 
 [[maybe_unused]] const bool prop_timed_registered = [] {

@@ -54,7 +54,7 @@ class PropUnit : public Unit {
 
   bool idle() const override {
     return in_bins_.empty() && in_tested_.empty() && in_shaded_.empty() && current_.warp == nullptr && order_.empty() &&
-           in_turn_.warp == nullptr && on_late_way_ == 0;
+           on_late_way_ == 0;
   }
   Behaviour& behaviour() override { return *behaviour_; }
 
@@ -152,15 +152,14 @@ class PropUnit : public Unit {
 
   /// Whether there is a warp to hand to CROP.
   bool has_next() { return tests_late_ ? has_next_beside_late() : order_.has_next(); }
-  [[gnu::noinline]] bool has_next_beside_late() {
-    if (in_turn_.warp == nullptr && order_.has_next()) in_turn_ = order_.take();
-    if (is_empty_in_turn()) return true;
+  [[gnu::noinline]] bool has_next_beside_late() const {
+    if (next_is_empty()) return true;
     if (on_late_way_ > 0) return in_late_.ready() && in_late_.front().warp->mark == Mark::none;
-    return in_turn_.warp != nullptr && !is_late(*in_turn_.warp);
+    return order_.has_next() && !is_late(*order_.next().warp);
   }
   [[gnu::noinline]] ReorderBuffer::Waiting take_next() {
-    is_back_ = on_late_way_ > 0 && !is_empty_in_turn();
-    if (!is_back_) return std::exchange(in_turn_, {});
+    is_back_ = on_late_way_ > 0 && !next_is_empty();
+    if (!is_back_) return order_.take();
     ReorderBuffer::Waiting back;
     back.warp = in_late_.front().warp;
     in_late_.pop();
@@ -168,16 +167,15 @@ class PropUnit : public Unit {
     return back;
   }
   /// One without quads is only released, whatever is on the late way.
-  bool is_empty_in_turn() const { return in_turn_.warp != nullptr && in_turn_.warp->count == 0; }
+  bool next_is_empty() const { return order_.has_next() && order_.next().warp->count == 0; }
   bool is_late(const ShadedWarp& warp) const { return warp.count > 0 && plan_.is_late(warp.draw[0]); }
 
   /// Sends warps to be tested late, and marks that wait for these.
   [[gnu::noinline]] bool send_late(Cycle now) {
     bool moved = false;
     for (; out_late_.credits() > 0; moved = true) {
-      if (in_turn_.warp == nullptr && order_.has_next()) in_turn_ = order_.take();
-      const bool is_mark = in_turn_.warp == nullptr;
-      const ReorderBuffer::Waiting* const next = is_mark ? order_.next_mark() : &in_turn_;
+      const bool is_mark = !order_.has_next();
+      const ReorderBuffer::Waiting* const next = is_mark ? order_.next_mark() : &order_.next();
       if (next == nullptr || !(is_mark ? plan_.waits_at(next->warp->mark) : is_late(*next->warp))) break;
       const unsigned width = std::max<unsigned>(next->warp->count, 1);
       if (!late_limit_.allows(width, now)) {
@@ -191,16 +189,13 @@ class PropUnit : public Unit {
         order_.leave_mark();
       } else {
         did(PropWork::late, width, now);
-        order_.leave(in_turn_.turn);
-        in_turn_.warp = nullptr;
+        order_.leave(order_.take().turn);
       }
     }
     return moved;
   }
 
-  [[gnu::noinline]] bool has_late_work() const {
-    return in_late_.ready() || (in_turn_.warp != nullptr && on_late_way_ == 0);
-  }
+  [[gnu::noinline]] bool has_late_work() const { return in_late_.ready() || (order_.has_next() && on_late_way_ == 0); }
   [[gnu::noinline]] Cycle next_late(Cycle now) const {
     Cycle next = never;
     for (const Cycle at : {late_free_at_, in_late_.next_ready()}) {
@@ -285,9 +280,8 @@ class PropUnit : public Unit {
   // In a frame with late tests:
   BatchLimit late_limit_;
   Cycle late_free_at_ = 0;
-  ReorderBuffer::Waiting in_turn_;  ///< the warp whose turn it is to go either way; none without a warp
-  unsigned on_late_way_ = 0;        ///< warps and marks that were sent to be tested late and have not left for CROP
-  bool is_back_ = false;            ///< `current_` comes from there
+  unsigned on_late_way_ = 0;  ///< warps and marks that were sent to be tested late and have not left for CROP
+  bool is_back_ = false;      ///< `current_` comes from there
 };
 
 [[maybe_unused]] const bool prop_unit_registered = [] {

@@ -59,6 +59,8 @@ class ReorderBuffer {
   }
 
   bool has_next() const { return !in_turn_.empty(); }
+  /// The oldest whose turn it is, if there is one.
+  const Waiting& next() const { return in_turn_.oldest(); }
   Waiting take() { return in_turn_.take_oldest(); }
   /// The warp of a turn has left: the one that follows it may be among those that came early.
   [[gnu::always_inline]] void leave(Turn turn, Cycle at = 0) {
@@ -88,7 +90,18 @@ class ReorderBuffer {
       put(waiting);
       ++count_;
     }
+    const Waiting& oldest() const { return ring_[place_of_oldest()]; }
     Waiting take_oldest() {
+      const std::size_t place = place_of_oldest();
+      const Waiting& oldest = ring_[place];
+      there_[place / 64] &= ~(std::uint64_t{1} << (place % 64));
+      oldest_ = oldest.sequence + 1;
+      --count_;
+      return oldest;
+    }
+
+   private:
+    [[gnu::always_inline]] std::size_t place_of_oldest() const {
       const std::size_t from = oldest_ & (ring_.size() - 1);
       std::size_t word = from / 64;
       std::uint64_t there = there_[word] & (~std::uint64_t{0} << (from % 64));
@@ -96,14 +109,8 @@ class ReorderBuffer {
         word = word + 1 == there_.size() ? 0 : word + 1;
         there = there_[word];
       }
-      const Waiting& oldest = ring_[64 * word + static_cast<unsigned>(__builtin_ctzll(there))];
-      there_[word] &= ~(there & -there);
-      oldest_ = oldest.sequence + 1;
-      --count_;
-      return oldest;
+      return 64 * word + static_cast<unsigned>(__builtin_ctzll(there));
     }
-
-   private:
     void put(const Waiting& waiting) {
       const std::size_t place = waiting.sequence & (ring_.size() - 1);
       ring_[place] = waiting;

@@ -185,6 +185,17 @@ TEST_P(LateProp, WhatIsNotTestedLateWaitsForWhatIs) {
   EXPECT_GT(left_at[2], 100U);
 }
 
+// As in a frame without late tests: it is not chosen before it can go.
+TEST_P(LateProp, TheOldestThatIsThereGoesWhenTheWayIsFree) {
+  make({{"color_bytes_per_cycle", "16"}}, 2);  // a quad in two cycles
+  shaded->add(warp(0, 0, 0, 1), 10);
+  shaded->add(warp(2, 1, 0, 1), 14);
+  shaded->add(warp(1, 2, 0, 1), 20);
+  bench->run();
+  if (GetParam() == Fidelity::lt) GTEST_SKIP() << "chooses among those that have come when it is called";
+  EXPECT_EQ(left, (Numbers{0, 1, 2}));
+}
+
 TEST_P(LateProp, AMarkThatWaitsForLateTestsGoesTheirWay) {
   make();
   shaded->add(warp(0, 0, 0, 0), 10);
