@@ -43,7 +43,7 @@ class TimedProp : public TimedUnit {
         in_late_(*this, "in_late",
                  [this](const ShadedWarpItem& item, CycleInterval visible) {
                    const Cycle taken = take_back(*item.warp, visible.first);
-                   if (!is_leaving_) leave_beside_late();
+                   if (!is_leaving_) leave_until(visible.first + 1);
                    return taken;
                  }),
         in_shaded_(*this, "in_shaded",
@@ -65,7 +65,7 @@ class TimedProp : public TimedUnit {
     in_tested_.set_comes_ahead();
     in_shaded_.set_comes_ahead();
     in_late_.set_comes_ahead();
-    if (!plan_.is_used()) out_release_.on_asked([this](Cycle until) { leave_until(until); });
+    out_release_.on_asked([this](Cycle until) { leave_until(until); });
   }
 
   bool idle() const override { return order_.empty() && on_late_way_ == 0; }
@@ -97,19 +97,14 @@ class TimedProp : public TimedUnit {
   }
 
   Cycle collect(const ShadedWarp& warp, Cycle visible) {
-    if (!plan_.is_used()) leave_until(visible + 1);
+    leave_until(visible + 1);
     if (warp.mark != Mark::none) {
       order_.arrive_mark(warp, visible + 1);
-    } else {
-      order_.arrive(warp, visible + 1);
-    }
-    if (plan_.is_used()) {
-      leave_beside_late();
-    } else if (warp.mark != Mark::none) {
       leave_until(never);  // it comes behind all before it
-    } else if (!std::exchange(is_awake_, true)) {
-      clock.domain->wake(clock.unit, next_tick(now()));
+      return visible;
     }
+    order_.arrive(warp, visible + 1);
+    if (!std::exchange(is_awake_, true)) clock.domain->wake(clock.unit, next_tick(now()));
     return visible;
   }
   Cycle tick(Cycle now) override {
@@ -121,6 +116,7 @@ class TimedProp : public TimedUnit {
 
   /// Lets those warps leave whose turn has come and whose way is free before a cycle.
   void leave_until(Cycle until) {
+    if (plan_.is_used()) return leave_beside_late(until);
     do {
       while (order_.has_next() && way_is_free_before(until)) leave(order_.take());
     } while (pass_mark());
@@ -195,17 +191,17 @@ class TimedProp : public TimedUnit {
 
   bool is_late(const ShadedWarp& warp) const { return warp.count > 0 && plan_.is_late(warp.draw[0]); }
   /// In a frame with late tests: either way.
-  [[gnu::noinline]] void leave_beside_late() {
+  [[gnu::noinline]] void leave_beside_late(Cycle until) {
     is_leaving_ = true;
-    while (leave_one_beside_late()) continue;
+    while (leave_one_beside_late(until)) continue;
     is_leaving_ = false;
   }
-  bool leave_one_beside_late() {
+  bool leave_one_beside_late(Cycle until) {
     const bool is_mark = !order_.has_next();
     const ReorderBuffer::Waiting* const next = is_mark ? order_.next_mark() : &order_.next();
     if (next == nullptr) return false;
     const bool goes_late = is_mark ? plan_.waits_at(next->warp->mark) : is_late(*next->warp);
-    if (!goes_late) return leave_behind_late(is_mark);
+    if (!goes_late) return leave_behind_late(is_mark, until);
     send_late(is_mark ? *next : order_.take(), is_mark);
     return true;
   }
@@ -223,18 +219,19 @@ class TimedProp : public TimedUnit {
     late_.hold(out_late_.send({next.warp}, at).first);
   }
   /// What is not tested late goes on when nothing is on that way, but for warps without quads, which are only released.
-  bool leave_behind_late(bool is_mark) {
-    if (!is_mark && order_.next().warp->count == 0) {
+  bool leave_behind_late(bool is_mark, Cycle until) {
+    if (!is_mark && order_.next().warp->count == 0 && order_.next().from <= back_until_) {
       pass_over(order_.take());
       return true;
     }
     if (on_late_way_ > 0) return false;
     if (is_mark) return pass_mark();
+    if (!way_is_free_before(until)) return false;
     leave(order_.take());
     return true;
   }
-  /// One a cycle. What is on the late way has taken the ways to CROP and SM already, for when it is back: it does not wait for
-  /// that.
+  /// One a cycle. What is on the late way in its time has taken the ways to CROP and SM already, for when it is back: it does
+  /// not wait for that.
   void pass_over(const ReorderBuffer::Waiting& empty) {
     passed_over_ = std::max({empty.from, passed_over_ + 1, out_late_.last()});
     if (color_.taken_of(passed_over_) == 0) did(PropWork::empty_warps, time_.color_rate.items, passed_over_);
@@ -248,9 +245,9 @@ class TimedProp : public TimedUnit {
     --on_late_way_;
     if (warp.mark != Mark::none) return hand_on_mark(warp, visible);
     const WarpRelease release{warp.slot};
-    const Cycle left = hand_on(warp, visible);
-    out_release_.send(release, left);
-    return left;
+    back_until_ = hand_on(warp, visible);
+    out_release_.send(release, back_until_);
+    return back_until_;
   }
 
   std::unique_ptr<PropBehaviour> behaviour_;
@@ -275,6 +272,7 @@ class TimedProp : public TimedUnit {
   // In a frame with late tests:
   IssuePort late_;
   Cycle passed_over_ = 0;     ///< the last warp without quads
+  Cycle back_until_ = 0;      ///< the last that has been tested late has left
   unsigned on_late_way_ = 0;  ///< warps and marks that were sent to be tested late and are not back
   bool is_leaving_ = false;   ///< while what is in turn is sent, when it may come back at once
 };

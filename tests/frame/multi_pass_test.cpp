@@ -287,8 +287,8 @@ TEST_P(TimeBetweenPasses, DependsLittleOnWhatHasTerminated) {
   none.resize(dots.size(), testing::round_splat(1, 1, 0.5F, 0.1F));
   const auto cycles = static_cast<double>(time(Fidelity::cycle, dots));
   EXPECT_LT(cycles, 1.5 * static_cast<double>(time(Fidelity::cycle, none)));
-  // Of the z-cache lt does not see what has gone between look-up and change.
-  EXPECT_NEAR(static_cast<double>(time(Fidelity::lt, dots)), cycles, 0.1 * cycles);
+  // What has gone from a small z-cache between look-up and change, lt does not see.
+  EXPECT_NEAR(static_cast<double>(time(Fidelity::lt, dots)), cycles, 0.15 * cycles);
 }
 
 TEST(MultiPass, APlatformOnWhichCropTellsDrawNothingIsRefusedAtEveryFidelity) {
