@@ -43,7 +43,7 @@ class TimedProp : public TimedUnit {
         in_late_(*this, "in_late",
                  [this](const ShadedWarpItem& item, CycleInterval visible) {
                    const Cycle taken = take_back(*item.warp, visible.first);
-                   if (!is_leaving_) leave_until(visible.first + 1);
+                   if (!is_leaving_) leave_beside_late();
                    return taken;
                  }),
         in_shaded_(*this, "in_shaded",
@@ -65,7 +65,7 @@ class TimedProp : public TimedUnit {
     in_tested_.set_comes_ahead();
     in_shaded_.set_comes_ahead();
     in_late_.set_comes_ahead();
-    out_release_.on_asked([this](Cycle until) { leave_until(until); });
+    if (!plan_.is_used()) out_release_.on_asked([this](Cycle until) { leave_until(until); });
   }
 
   bool idle() const override { return order_.empty() && on_late_way_ == 0; }
@@ -97,14 +97,19 @@ class TimedProp : public TimedUnit {
   }
 
   Cycle collect(const ShadedWarp& warp, Cycle visible) {
-    leave_until(visible + 1);
+    if (!plan_.is_used()) leave_until(visible + 1);
     if (warp.mark != Mark::none) {
       order_.arrive_mark(warp, visible + 1);
-      leave_until(never);  // it comes behind all before it
-      return visible;
+    } else {
+      order_.arrive(warp, visible + 1);
     }
-    order_.arrive(warp, visible + 1);
-    if (!std::exchange(is_awake_, true)) clock.domain->wake(clock.unit, next_tick(now()));
+    if (plan_.is_used()) {
+      leave_beside_late();
+    } else if (warp.mark != Mark::none) {
+      leave_until(never);  // it comes behind all before it
+    } else if (!std::exchange(is_awake_, true)) {
+      clock.domain->wake(clock.unit, next_tick(now()));
+    }
     return visible;
   }
   Cycle tick(Cycle now) override {
@@ -116,7 +121,6 @@ class TimedProp : public TimedUnit {
 
   /// Lets those warps leave whose turn has come and whose way is free before a cycle.
   void leave_until(Cycle until) {
-    if (plan_.is_used()) return leave_beside_late(until);
     do {
       while (order_.has_next() && way_is_free_before(until)) leave(order_.take());
     } while (pass_mark());
@@ -191,17 +195,17 @@ class TimedProp : public TimedUnit {
 
   bool is_late(const ShadedWarp& warp) const { return warp.count > 0 && plan_.is_late(warp.draw[0]); }
   /// In a frame with late tests: either way.
-  [[gnu::noinline]] void leave_beside_late(Cycle until) {
+  [[gnu::noinline]] void leave_beside_late() {
     is_leaving_ = true;
-    while (leave_one_beside_late(until)) continue;
+    while (leave_one_beside_late()) continue;
     is_leaving_ = false;
   }
-  bool leave_one_beside_late(Cycle until) {
+  bool leave_one_beside_late() {
     const bool is_mark = !order_.has_next();
     const ReorderBuffer::Waiting* const next = is_mark ? order_.next_mark() : &order_.next();
     if (next == nullptr) return false;
     const bool goes_late = is_mark ? plan_.waits_at(next->warp->mark) : is_late(*next->warp);
-    if (!goes_late) return leave_behind_late(is_mark, until);
+    if (!goes_late) return leave_behind_late(is_mark);
     send_late(is_mark ? *next : order_.take(), is_mark);
     return true;
   }
@@ -219,14 +223,13 @@ class TimedProp : public TimedUnit {
     late_.hold(out_late_.send({next.warp}, at).first);
   }
   /// What is not tested late goes on when nothing is on that way, but for warps without quads, which are only released.
-  bool leave_behind_late(bool is_mark, Cycle until) {
+  bool leave_behind_late(bool is_mark) {
     if (!is_mark && order_.next().warp->count == 0 && order_.next().from <= back_until_) {
       pass_over(order_.take());
       return true;
     }
     if (on_late_way_ > 0) return false;
     if (is_mark) return pass_mark();
-    if (!way_is_free_before(until)) return false;
     leave(order_.take());
     return true;
   }
