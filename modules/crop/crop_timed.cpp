@@ -231,13 +231,14 @@ class TimedCrop : public TimedUnit {
   /// From when on the port takes more, by what was sent before: lines are written back when quads are blended, which is long
   /// after the look-ups of those behind them. What ZROP reads for quads that come later is known late.
   Cycle port_open_from(Cycle at) {
-    while (true) {
+    while (time_.port.is_on()) {
       for (; !sent_.empty() && sent_.front().at <= at; sent_.pop())
         sent_before_.take(sent_.front().flits, sent_.front().at, clock.domain->now());
       const Cycle open = sent_before_.open_from(at);
-      if (open == at) return at;
+      if (open == at) break;
       at = open;
     }
+    return at;
   }
   void send(unsigned flits, Cycle at) {
     if (flits == 0 || !time_.port.is_on()) return;
