@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vrpipe/workloads/multi_pass.h>
+
 #include "support/builders.h"
 #include "support/measured_scenes.h"
 #include "support/simulate.h"
@@ -35,6 +37,25 @@ TEST(MeasuredScenes, TheSmallestHasItsCounts) {
   expect_near(counts.warps, "warps");
   expect_near(testing::run(on_the_gpu("het", Fidelity::functional), scene.draw).counts.fragments_shaded,
               "fragments_until_termination");
+}
+
+// Early termination by software; cycles by benchmarks/measured_gpu --passes.
+TEST(MeasuredScenes, TheSmallestHasItsCountsInPasses) {
+  const Draw draw = testing::measured_scene("sweep-50k").draw;
+  const RunRequest request = on_the_gpu("baseline", Fidelity::functional);
+  for (const testing::MeasuredScene& row : testing::measured_passes()) {
+    if (row.name != "sweep-50k" || row.count("passes") == 1) continue;
+    DrawState state = draw_state_of(request);
+    state.early_termination = false;
+    const auto frame = multi_pass_frame(draw, state, static_cast<std::uint32_t>(row.count("passes")));
+    const Counts counts = testing::run(request, *frame).counts;
+    const auto expect_near = [&](std::uint64_t got, const std::string& column) {
+      EXPECT_NEAR(static_cast<double>(got), row.values.at(column), 2e-4 * row.values.at(column))
+          << column << ", passes " << row.count("passes");
+    };
+    expect_near(counts.fragments_shaded, "fragments");
+    expect_near(counts.fragments_blended + counts.fragments_unblended, "samples_passed");
+  }
 }
 
 struct Drawn {
