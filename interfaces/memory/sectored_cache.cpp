@@ -47,8 +47,12 @@ SectoredCache::SectoredCache(const CacheOrganization& organization, SectoredCach
   sector_bytes_ = organization.sector_bytes;
   interleaving_ = Interleaving(organization.sets());
   lines_.resize(organization.lines());
-  for (Line line = 0; line < lines_.size(); ++line) lines_[line].set = line / ways_;
+  links_.resize(lines_.size());
+  seen_.resize(lines_.size());
   sets_.resize(organization.sets());
+  for (std::uint32_t set = 0; set < sets_.size(); ++set) {
+    for (std::uint32_t way = 0; way < ways_; ++way) links_[line_of(set, way)].set = set;
+  }
   const unsigned bits = chain_bits(organization.lines());
   chain_shift_ = 64 - bits;
   chains_.assign(std::size_t{1} << bits, no_line);
@@ -101,9 +105,9 @@ SectoredCache::Line SectoredCache::allocate(std::uint64_t address, Evicted& evic
   Entry& entry = lines_[line];
   entry.tag = tag;
   entry.note = 0;
-  entry.were_there = details_ ? &were_there_.of(tag) : everything_.data();
+  seen_[line] = details_ ? &were_there_.of(tag) : everything_.data();
   Line& chain = chains_[chain_of(tag)];
-  entry.next = chain;
+  links_[line].next = chain;
   chain = line;
   if (is_masked()) {
     const std::size_t words = mask_words(organization_);
@@ -119,8 +123,8 @@ SectoredCache::Line SectoredCache::allocate(std::uint64_t address, Evicted& evic
 
 SectoredCache::Line SectoredCache::free_line(std::uint32_t set) {
   std::uint32_t& way = sets_[set].lowest_free;
-  while (lines_[set * ways_ + way].tag != no_tag) ++way;
-  return set * ways_ + way++;
+  while (lines_[line_of(set, way)].tag != no_tag) ++way;
+  return line_of(set, way++);
 }
 
 SectoredCache::Line SectoredCache::victim(std::uint32_t set) {
@@ -128,15 +132,14 @@ SectoredCache::Line SectoredCache::victim(std::uint32_t set) {
     case Replacement::lru: break;
     case Replacement::fifo: {
       Line line = sets_[set].oldest;
-      while (lines_[line].pins != 0) line = lines_[line].newer;
+      while (lines_[line].pins != 0) line = links_[line].newer;
       return line;
     }
     case Replacement::random: {
       std::uint64_t before = mix(organization_.random_seed + evictions_) % (ways_ - sets_[set].pinned);
-      Line line = set * ways_;
-      if (sets_[set].pinned == 0) return line + static_cast<Line>(before);
-      for (;; ++line) {
-        if (lines_[line].pins == 0 && before-- == 0) return line;
+      if (sets_[set].pinned == 0) return line_of(set, static_cast<std::uint32_t>(before));
+      for (std::uint32_t way = 0;; ++way) {
+        if (lines_[line_of(set, way)].pins == 0 && before-- == 0) return line_of(set, way);
       }
     }
     case Replacement::tree_plru: {
@@ -150,7 +153,7 @@ SectoredCache::Line SectoredCache::victim(std::uint32_t set) {
 // Inner node n has children 2n and 2n + 1; way w is leaf `ways` + w.
 
 void SectoredCache::point_away(Set& set, Line line) {
-  for (std::uint32_t node = ways_ + line % ways_; node > 1; node /= 2) {
+  for (std::uint32_t node = ways_ + way_of(line); node > 1; node /= 2) {
     const std::uint64_t bit = std::uint64_t{1} << (node / 2);
     set.tree = node % 2 == 0 ? set.tree | bit : set.tree & ~bit;
   }
@@ -162,7 +165,7 @@ SectoredCache::Line SectoredCache::victim_of_tree(std::uint32_t set, CanGo&& can
     std::uint32_t end = node + 1;
     for (; node < ways_; node *= 2) end *= 2;
     for (; node < end; ++node) {
-      if (can_go(set * ways_ + node - ways_)) return true;
+      if (can_go(line_of(set, node - ways_))) return true;
     }
     return false;
   };
@@ -171,24 +174,23 @@ SectoredCache::Line SectoredCache::victim_of_tree(std::uint32_t set, CanGo&& can
     node = 2 * node + (sets_[set].tree >> node & 1U);
     if (!has_one(node)) node ^= 1U;
   }
-  return set * ways_ + node - ways_;
+  return line_of(set, node - ways_);
 }
 
 SectoredCache::Line SectoredCache::victim_not_kept(std::uint32_t set) const {
   const auto can_go = [&](Line line) { return lines_[line].pins == 0 && !kept_[line]; };
   if (replacement_ == Replacement::lru || replacement_ == Replacement::fifo) {
     Line line = sets_[set].oldest;
-    while (line != no_line && !can_go(line)) line = lines_[line].newer;
+    while (line != no_line && !can_go(line)) line = links_[line].newer;
     return line;
   }
-  const Line first = set * ways_;
   std::uint32_t others = 0;
-  for (Line line = first; line < first + ways_; ++line) others += can_go(line) ? 1U : 0U;
+  for (std::uint32_t way = 0; way < ways_; ++way) others += can_go(line_of(set, way)) ? 1U : 0U;
   if (others == 0) return no_line;
   if (replacement_ == Replacement::tree_plru) return victim_of_tree(set, can_go);
   std::uint64_t before = mix(organization_.random_seed + evictions_) % others;
-  for (Line line = first;; ++line) {
-    if (can_go(line) && before-- == 0) return line;
+  for (std::uint32_t way = 0;; ++way) {
+    if (can_go(line_of(set, way)) && before-- == 0) return line_of(set, way);
   }
 }
 
@@ -196,19 +198,20 @@ void SectoredCache::keep(Line line) {
   if (kept_.empty()) kept_.resize(lines_.size());
   if (kept_[line]) return;
   kept_[line] = true;
-  ++sets_[lines_[line].set].kept;
+  ++sets_[links_[line].set].kept;
 }
 
 void SectoredCache::take_out(Line line) {
   Entry& entry = lines_[line];
-  if (Set& set = sets_[entry.set]; set.kept != 0 && kept_[line]) {
+  Set& set = sets_[links_[line].set];
+  if (set.kept != 0 && kept_[line]) {
     kept_[line] = false;
     --set.kept;
   }
-  if (replacement_ == Replacement::lru || replacement_ == Replacement::fifo) unlink(sets_[entry.set], line);
+  if (replacement_ == Replacement::lru || replacement_ == Replacement::fifo) unlink(set, line);
   Line* at = &chains_[chain_of(entry.tag)];
-  while (*at != line) at = &lines_[*at].next;
-  *at = entry.next;
+  while (*at != line) at = &links_[*at].next;
+  *at = links_[line].next;
   entry.present = entry.filling = entry.dirty = 0;
 }
 
@@ -222,9 +225,9 @@ void SectoredCache::invalidate(Line line) {
   take_out(line);
   entry.tag = no_tag;
   --held_;
-  Set& set = sets_[entry.set];
+  Set& set = sets_[links_[line].set];
   --set.held;
-  set.lowest_free = std::min(set.lowest_free, line % ways_);
+  set.lowest_free = std::min(set.lowest_free, way_of(line));
 }
 
 void SectoredCache::invalidate() {
@@ -262,7 +265,7 @@ std::uint32_t SectoredCache::write(Line line, unsigned first, unsigned bytes) {
   const std::uint32_t whole = from < to ? sector_mask(from, to - from) : 0;
   entry.dirty |= written;
   entry.present |= whole;
-  count_unfilled(missing & whole, *entry.were_there);
+  count_unfilled(missing & whole, *seen_[line]);
   return missing & ~whole;
 }
 
@@ -291,7 +294,7 @@ std::uint32_t SectoredCache::write_masked(Line line, unsigned first, unsigned by
   entry.dirty |= written;
   entry.present |= completed;
   count_unfilled(missed, were_touched_.of(entry.tag));
-  *entry.were_there |= completed;
+  *seen_[line] |= completed;
   return 0;
 }
 
@@ -306,8 +309,8 @@ LineAccess SectoredCache::access(std::uint64_t address, std::uint32_t bytes, boo
   Entry& entry = lines_[access.line];
   if (access.filled != 0) {
     entry.present |= access.filled;
-    access.filled_first = access.filled & ~(is_masked() ? were_touched_.of(entry.tag) : *entry.were_there);
-    count_misses(entry, access.filled);
+    access.filled_first = access.filled & ~(is_masked() ? were_touched_.of(entry.tag) : *seen_[access.line]);
+    count_misses(access.line, access.filled);
   }
   access.missed = missed_sectors_;
   if (shadow_ != nullptr) follow(address, bytes, writes);
@@ -321,10 +324,10 @@ void SectoredCache::count_compulsory(std::uint32_t sectors) {
   first_time_ |= sectors;
 }
 
-void SectoredCache::fill_for_the_first_time(Entry& entry, std::uint32_t sectors) {
+void SectoredCache::fill_for_the_first_time(Line line, std::uint32_t sectors) {
   count_compulsory(sectors);
-  *entry.were_there |= sectors;
-  if (is_masked()) were_touched_.of(entry.tag) |= sectors;
+  *seen_[line] |= sectors;
+  if (is_masked()) were_touched_.of(lines_[line].tag) |= sectors;
 }
 
 void SectoredCache::count_unfilled(std::uint32_t sectors, std::uint32_t& before) {
@@ -359,8 +362,9 @@ void SectoredCache::find_conflicts(std::uint32_t missed_by_shadow) {
 
 void SectoredCache::hold_as(const SectoredCache& other) {
   lines_ = other.lines_;
-  for (Entry& entry : lines_) {
-    if (entry.were_there != nullptr) entry.were_there = details_ ? &were_there_.of(entry.tag) : everything_.data();
+  links_ = other.links_;
+  for (Line line = 0; line < lines_.size(); ++line) {
+    if (lines_[line].tag != no_tag) seen_[line] = details_ ? &were_there_.of(lines_[line].tag) : everything_.data();
   }
   sets_ = other.sets_;
   chains_ = other.chains_;

@@ -24,25 +24,34 @@ class AnnotatedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
 
  private:
   Cycle serve(const MemoryRequest& request, Cycle arrival) override {
-    SectoredL2& l2 = *l2_.behaviour_;
-    l2.count(request);
+    const SectoredL2& l2 = *l2_.behaviour_;
+    l2_.behaviour_->count(request);
     const Cycle now = l2_.now();
     arrival = l2_.crossing_.edge_of(arrival);
     Cycle complete = 0;
-    l2.for_each_line(l2.looked_up_as(request), [&](std::uint64_t address, std::uint32_t bytes) {
-      const MemoryRequest part{address, bytes, request.command, request.origin};
-      const std::uint32_t in = l2.request_bytes(part);
-      const std::uint32_t out = l2.response_bytes(part);
-      bytes_in_ += in;
-      bytes_out_ += out;
-      // A request goes to its bank while its last bytes come in.
-      Cycle from = std::max(arrival, requests_.take(arrival, in, now) - 1);
-      ++lines_;
-      waited_ += from - arrival;
-      const Cycle there = l2.passes(part) ? l2_.pass(part, from, from) : l2_.look_up(part, from, from);
-      complete = std::max({complete, responses_.take(from, out, now), there});
-    });
+    if (l2.is_looked_up_as_is(request)) {
+      complete = serve_in_line(request, arrival, now);  // a copy would wait for the stores that have just made it
+    } else {
+      const MemoryRequest wanted = l2.looked_up_as(request);
+      l2.for_each_line(wanted, [&](std::uint64_t address, std::uint32_t bytes) {
+        const MemoryRequest part{address, bytes, wanted.command, wanted.origin};
+        complete = std::max(complete, serve_in_line(part, arrival, now));
+      });
+    }
     return l2_.crossing_.cycle_of(l2_.sizes_.latency_cycles + complete);
+  }
+  Cycle serve_in_line(const MemoryRequest& request, Cycle arrival, Cycle now) {
+    const SectoredL2& l2 = *l2_.behaviour_;
+    const std::uint32_t in = l2.request_bytes(request);
+    const std::uint32_t out = l2.response_bytes(request);
+    bytes_in_ += in;
+    bytes_out_ += out;
+    // A request goes to its bank while its last bytes come in.
+    const Cycle from = std::max(arrival, requests_.take(arrival, in, now) - 1);
+    ++lines_;
+    waited_ += from - arrival;
+    const Served served = l2.passes(request) ? l2_.pass(request, from) : l2_.look_up(request, from);
+    return std::max(responses_.take(served.from, out, now), served.there);
   }
   const ClockDomain& clock() const override { return *l2_.clock.domain; }
 
@@ -116,16 +125,13 @@ std::uint64_t AnnotatedL2::write_back(const LineAccess& done, Bank& bank, Cycle 
   return moved;
 }
 
-Cycle AnnotatedL2::pass(const MemoryRequest& access, Cycle arrival, Cycle& from) {
-  const std::uint32_t index = behaviour_->bank_of(access.address);
-  Bank& bank = banks_[index];
+AnnotatedL2::Served AnnotatedL2::pass(const MemoryRequest& access, Cycle arrival) {
+  Bank& bank = banks_[behaviour_->bank_of(access.address)];
   const Cycle begin = bank.write_backs.free_from(arrival);
   const Cycle done = write(behaviour_->below_as(access), bank, begin + 1);
   const std::uint32_t cycles = behaviour_->bank_cycles(access.bytes);
-  const Cycle free_at = occupy(bank, arrival, begin, cycles);
-  behaviour_->count_bank(index, access.bytes);
-  from = std::max(done, free_at - cycles);
-  return from + cycles;
+  const Cycle from = std::max(done, occupy(bank, arrival, begin, cycles) - cycles);
+  return {from, from + cycles};
 }
 
 AnnotatedL2::Wait AnnotatedL2::fetch(const MemoryRequest& access, const LineAccess& done, Bank& bank, Cycle arrival) {
@@ -166,23 +172,35 @@ AnnotatedL2::Wait AnnotatedL2::fetch(const MemoryRequest& access, const LineAcce
   return wait;
 }
 
-Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& from) {
+AnnotatedL2::Served AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival) {
   const bool writes = access.command == tlm::TLM_WRITE_COMMAND;
-  LineAccess done;
-  done.line = cache_.hit(access.address, access.bytes, writes, done.sectors);
-  const bool is_hit = done.line != SectoredCache::no_line;
-  if (!is_hit) done = cache_.access(access.address, access.bytes, writes);
-  behaviour_->looked_up(access, static_cast<unsigned>(__builtin_popcount(done.sectors)),
-                        static_cast<unsigned>(__builtin_popcount(done.missed)));
-  const std::uint32_t index = behaviour_->bank_of_line(done.line);
-  Bank& bank = banks_[index];
-  Wait wait{arrival, arrival, access.bytes};
-  if (!is_hit || cache_.note(done.line) > arrival) wait = fetch(access, done, bank, arrival);
-  const std::uint32_t cycles = behaviour_->bank_cycles(wait.moved);
-  const Cycle free_at = occupy(bank, arrival, wait.begin, cycles);
-  behaviour_->count_bank(index, wait.moved);
-  from = std::max(wait.all_there, free_at - cycles);
-  return from + behaviour_->bank_cycles(access.bytes);
+  const std::uint32_t cycles = behaviour_->bank_cycles(access.bytes);
+  std::uint32_t sectors = 0;
+  const SectoredCache::Line line = cache_.hit(access.address, access.bytes, writes, sectors);
+  if (line == SectoredCache::no_line) {
+    const LineAccess done = cache_.access(access.address, access.bytes, writes);
+    behaviour_->looked_up(access, static_cast<unsigned>(__builtin_popcount(done.sectors)),
+                          static_cast<unsigned>(__builtin_popcount(done.missed)));
+    return wait(access, done, arrival, cycles);
+  }
+  behaviour_->looked_up(access, static_cast<unsigned>(__builtin_popcount(sectors)), 0);
+  if (cache_.note(line) > arrival) {
+    LineAccess hit;
+    hit.line = line;
+    hit.sectors = sectors;
+    return wait(access, hit, arrival, cycles);
+  }
+  const Cycle done = occupy(banks_[behaviour_->bank_of_line(line)], arrival, arrival, cycles);
+  return {done - cycles, done};
+}
+
+AnnotatedL2::Served AnnotatedL2::wait(const MemoryRequest& access, const LineAccess& done, Cycle arrival,
+                                      std::uint32_t cycles) {
+  Bank& bank = banks_[behaviour_->bank_of_line(done.line)];
+  const Wait wait = fetch(access, done, bank, arrival);
+  const std::uint32_t moving = behaviour_->bank_cycles(wait.moved);
+  const Cycle from = std::max(wait.all_there, occupy(bank, arrival, wait.begin, moving) - moving);
+  return {from, from + cycles};
 }
 
 MemoryUnit::Order AnnotatedL2::order(Cycle end, bool is_bottleneck) const {

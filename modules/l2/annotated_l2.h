@@ -67,11 +67,18 @@ class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private 
     std::uint64_t moved;  ///< bytes, by its bank
   };
   /// Of what was looked up.
-  [[gnu::noinline]] Wait fetch(const MemoryRequest& access, const LineAccess& done, Bank& bank, Cycle arrival);
-  /// The first cycle in which a request in one line has its data; `from` gets when its bank has begun on it.
-  Cycle look_up(const MemoryRequest& access, Cycle arrival, Cycle& from);
-  /// The same for one that goes below without a look-up, and is served when that has it.
-  Cycle pass(const MemoryRequest& access, Cycle arrival, Cycle& from);
+  Wait fetch(const MemoryRequest& access, const LineAccess& done, Bank& bank, Cycle arrival);
+  /// Of a request in one line.
+  struct Served {
+    Cycle from;   ///< its bank has begun on it
+    Cycle there;  ///< the first cycle in which it has its data
+  };
+  Served look_up(const MemoryRequest& access, Cycle arrival);
+  /// One that did not find all that it needs; its own bytes take the bank so many cycles.
+  [[gnu::noinline]] Served wait(const MemoryRequest& access, const LineAccess& done, Cycle arrival,
+                                std::uint32_t cycles);
+  /// One that goes below without a look-up, and is served when that has it.
+  Served pass(const MemoryRequest& access, Cycle arrival);
   /// The present.
   Cycle now() const { return crossing_.edge_of(clock.domain->now()); }
   /// An access to the memory below.

@@ -139,7 +139,6 @@ tlm::tlm_base_target_socket_b<32>& ClockedL2::target(unsigned index) { return po
 inline void ClockedL2::queue(std::uint32_t request) {
   const MemoryRequest& access = requests_[request].access;
   behaviour_->count(access);
-  cache_.prefetch_line(access.address);
   if (!behaviour_->is_in_one_line(access)) return queue_by_line(request);
   queue_at_bank(request);
 }

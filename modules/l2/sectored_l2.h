@@ -149,6 +149,8 @@ class SectoredL2 final : public MemoryBehaviour {
     if (!sees_all_writes_) request.address |= std::uint64_t{request.origin.round} << round_shift;
     return request;
   }
+  /// Whether that is itself, and lies in one line.
+  bool is_looked_up_as_is(const MemoryRequest& request) const { return sees_all_writes_ && is_in_one_line(request); }
   /// And the one that goes below.
   MemoryRequest below_as(MemoryRequest request) const {
     if (!sees_all_writes_) request.address &= (std::uint64_t{1} << round_shift) - 1;

@@ -41,20 +41,20 @@ class SectoredCache {
   Line find(std::uint64_t address) const {
     const std::uint64_t tag = address >> line_shift_;
     Line line = chains_[chain_of(tag)];
-    while (line != no_line && lines_[line].tag != tag) line = lines_[line].next;
+    while (line != no_line && lines_[line].tag != tag) line = links_[line].next;
     return line;
   }
-  /// Brings what `find` reads first of an address to the host's cache, or, once that is there, what it reads then. Tags of
-  /// a large cache are beyond the host's first caches.
-  void prefetch(std::uint64_t address) const { __builtin_prefetch(&chains_[chain_of(address >> line_shift_)]); }
-  void prefetch_line(std::uint64_t address) const {
+  /// Brings what `find` reads of an address to the host's cache. Tags of a large cache are beyond its first ones.
+  void prefetch(std::uint64_t address) const {
     const Line line = chains_[chain_of(address >> line_shift_)];
-    if (line != no_line) __builtin_prefetch(&lines_[line]);
+    if (line == no_line) return;
+    __builtin_prefetch(&lines_[line]);
+    __builtin_prefetch(&links_[line]);
   }
   /// Of a line that is held: the first byte of what it holds.
   std::uint64_t address(Line line) const { return lines_[line].tag << line_shift_; }
   /// The set of a line.
-  std::uint32_t set_of_line(Line line) const { return lines_[line].set; }
+  std::uint32_t set_of_line(Line line) const { return links_[line].set; }
   /// A number that whoever looks lines up keeps with a line; 0 once it is allocated. It comes to the host's cache with the tag.
   std::uint64_t& note(Line line) { return lines_[line].note; }
   /// Whether a line can be had for an address that is not held: its set has one that is free or not pinned.
@@ -79,14 +79,14 @@ class SectoredCache {
   void pin(Line line) {
     Entry& entry = lines_[line];
     if (entry.pins++ != 0) return;
-    Set& set = sets_[entry.set];
+    Set& set = sets_[links_[line].set];
     ++set.pinned;
     if (replacement_ == Replacement::lru) unlink(set, line);
   }
   void unpin(Line line) {
     Entry& entry = lines_[line];
     if (--entry.pins != 0) return;
-    Set& set = sets_[entry.set];
+    Set& set = sets_[links_[line].set];
     --set.pinned;
     if (replacement_ == Replacement::lru) return make_newest(set, line);
     use(line);
@@ -114,7 +114,7 @@ class SectoredCache {
     const auto count = static_cast<std::uint32_t>(__builtin_popcount(sectors));
     if (details_) see_filling(count);
     filling_ += count;
-    count_misses(entry, sectors);
+    count_misses(line, sectors);
   }
   /// Ends what start_fill began, while the line still holds the same.
   void finish_fill(Line line, std::uint32_t sectors) {
@@ -127,7 +127,7 @@ class SectoredCache {
   void fill_unread(Line line, std::uint32_t sectors) {
     Entry& entry = lines_[line];
     entry.present |= sectors;
-    count_misses(entry, sectors);
+    count_misses(line, sectors);
     not_filled_ += static_cast<unsigned>(__builtin_popcount(sectors));
   }
   void make_dirty(Line line, std::uint32_t sectors) { lines_[line].dirty |= sectors; }
@@ -170,7 +170,7 @@ class SectoredCache {
     access.filled = access.missed & ~access.known;
     if (access.missed != 0) {
       entry.present |= access.missed;
-      count_misses(entry, access.missed);
+      count_misses(access.line, access.missed);
       not_filled_ += static_cast<unsigned>(__builtin_popcount(access.missed & access.known));
     }
     if (shadow_ != nullptr) follow(access.address, access.sectors);
@@ -192,14 +192,17 @@ class SectoredCache {
   /// All at once for bytes of a line, as one access.
   LineAccess access(std::uint64_t address, std::uint32_t bytes, bool writes);
 
-  /// Takes all dirty sectors: `write_back(address of the line, sectors)`, by line.
+  /// Takes all dirty sectors: `write_back(address of the line, sectors)`, by set, then by way.
   template <class WriteBack>
   void flush(WriteBack&& write_back) {
-    for (Entry& entry : lines_) {
-      if (entry.dirty == 0) continue;
-      count_written_back(entry.dirty);
-      write_back(entry.tag << line_shift_, entry.dirty);
-      entry.dirty = 0;
+    for (std::uint32_t set = 0; set < sets_.size(); ++set) {
+      for (std::uint32_t way = 0; way < ways_; ++way) {
+        Entry& entry = lines_[line_of(set, way)];
+        if (entry.dirty == 0) continue;
+        count_written_back(entry.dirty);
+        write_back(entry.tag << line_shift_, entry.dirty);
+        entry.dirty = 0;
+      }
     }
   }
   /// Forgets what a line holds, which is not pinned; dirty sectors are lost.
@@ -212,19 +215,21 @@ class SectoredCache {
 
  private:
   static constexpr std::uint64_t no_tag = ~std::uint64_t{0};
-  /// In one line of the host's caches.
-  struct alignas(64) Entry {
+  /// Two in a line of the host's caches.
+  struct alignas(32) Entry {
     std::uint64_t tag = no_tag;
+    std::uint64_t note = 0;
     std::uint32_t present = 0;
     std::uint32_t filling = 0;
     std::uint32_t dirty = 0;
     std::uint32_t pins = 0;
+  };
+  /// Where it stands.
+  struct Links {
     Line newer = no_line;
     Line older = no_line;
     Line next = no_line;  ///< of the chain
     std::uint32_t set = 0;
-    std::uint32_t* were_there = nullptr;  ///< sectors of what it holds, so far
-    std::uint64_t note = 0;
   };
   struct Set {
     Line newest = no_line;  ///< lru: of the lines that are not pinned, by use; fifo: of all, by allocation
@@ -237,7 +242,11 @@ class SectoredCache {
   };
   struct Shadow;
 
-  std::size_t chain_of(std::uint64_t tag) const { return (tag * 0x9e3779b97f4a7c15ULL) >> chain_shift_; }
+  /// Lines that follow one another have neighbouring chains.
+  std::size_t chain_of(std::uint64_t tag) const {
+    const std::uint64_t block = tag >> (64 - chain_shift_);
+    return (tag ^ (block * 0x9e3779b97f4a7c15ULL) >> chain_shift_) & (chains_.size() - 1);
+  }
   std::uint32_t set_of_tag(std::uint64_t tag) const {
     const Interleaving::Share share = interleaving_.share(tag);
     return organization_.hashes_sets ? interleaving_.hashed_place<Interleaving::all_digits>(share) : share.place;
@@ -256,9 +265,11 @@ class SectoredCache {
       use(access.line);
     }
   }
+  Line line_of(std::uint32_t set, std::uint32_t way) const { return way * static_cast<Line>(sets_.size()) + set; }
+  std::uint32_t way_of(Line line) const { return line / static_cast<Line>(sets_.size()); }
   /// A line that is not pinned, or no longer.
   void use(Line line) {
-    Set& set = sets_[lines_[line].set];
+    Set& set = sets_[links_[line].set];
     if (replacement_ == Replacement::lru) {
       if (line == set.newest || lines_[line].pins != 0) return;
       unlink(set, line);
@@ -268,15 +279,15 @@ class SectoredCache {
     }
   }
   void unlink(Set& set, Line line) {
-    const Entry& entry = lines_[line];
-    (entry.newer == no_line ? set.newest : lines_[entry.newer].older) = entry.older;
-    (entry.older == no_line ? set.oldest : lines_[entry.older].newer) = entry.newer;
+    const Links& links = links_[line];
+    (links.newer == no_line ? set.newest : links_[links.newer].older) = links.older;
+    (links.older == no_line ? set.oldest : links_[links.older].newer) = links.newer;
   }
   void make_newest(Set& set, Line line) {
-    Entry& entry = lines_[line];
-    entry.newer = no_line;
-    entry.older = set.newest;
-    (set.newest == no_line ? set.oldest : lines_[set.newest].newer) = line;
+    Links& links = links_[line];
+    links.newer = no_line;
+    links.older = set.newest;
+    (set.newest == no_line ? set.oldest : links_[set.newest].newer) = line;
     set.newest = line;
   }
   void point_away(Set& set, Line line);
@@ -299,14 +310,14 @@ class SectoredCache {
     for (std::uint32_t i = 0; i < more; ++i) statistics_->sectors_filling.see(filling_ + i);
   }
   /// Of sectors that are filled.
-  void count_misses(Entry& entry, std::uint32_t sectors) {
+  void count_misses(Line line, std::uint32_t sectors) {
     missed_ += static_cast<unsigned>(__builtin_popcount(sectors));
     missed_sectors_ |= sectors;
-    if (const std::uint32_t first = sectors & ~*entry.were_there; __builtin_expect(first != 0, 0)) {
-      fill_for_the_first_time(entry, first);
+    if (const std::uint32_t first = sectors & ~*seen_[line]; __builtin_expect(first != 0, 0)) {
+      fill_for_the_first_time(line, first);
     }
   }
-  void fill_for_the_first_time(Entry& entry, std::uint32_t sectors);
+  void fill_for_the_first_time(Line line, std::uint32_t sectors);
   void count_compulsory(std::uint32_t sectors);
   /// Of sectors that are written whole, or masked. `before`: those that were there, to which they are added.
   void count_unfilled(std::uint32_t sectors, std::uint32_t& before);
@@ -339,7 +350,9 @@ class SectoredCache {
   std::uint64_t evictions_ = 0;       ///< so far, for random replacement
   std::uint32_t held_ = 0;
   std::uint32_t filling_ = 0;  ///< sectors
-  std::vector<Entry> lines_;   ///< ways of set 0, of set 1, ...
+  std::vector<Entry> lines_;   ///< of each set that in way 0, in way 1, ...: those of a tile stand beside one another
+  std::vector<Links> links_;   ///< the same
+  std::vector<std::uint32_t*> seen_;  ///< the same: sectors of what it holds that were there so far
   std::vector<Set> sets_;
   std::vector<Line> chains_;               ///< the first of the lines whose tags hash to a place
   std::vector<bool> kept_;                 ///< by line; empty before the first
