@@ -53,9 +53,9 @@ SectoredCache::SectoredCache(const CacheOrganization& organization, SectoredCach
   for (std::uint32_t set = 0; set < sets_.size(); ++set) {
     for (std::uint32_t way = 0; way < ways_; ++way) links_[line_of(set, way)].set = set;
   }
-  const unsigned bits = chain_bits(organization.lines());
-  chain_shift_ = 64 - bits;
-  chains_.assign(std::size_t{1} << bits, no_line);
+  chain_bits_ = chain_bits(organization.lines());
+  chains_.assign(std::size_t{1} << chain_bits_, no_line);
+  last_chain_ = chains_.size() - 1;
   if (organization.write_allocate == WriteAllocate::byte_mask) {
     byte_masks_.resize(lines_.size() * mask_words(organization));
   }

@@ -28,13 +28,13 @@ class AnnotatedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
     l2_.behaviour_->count(request);
     const Cycle now = l2_.now();
     arrival = l2_.crossing_.edge_of(arrival);
+    const std::uint64_t at = l2.looked_up_at(request);
     Cycle complete = 0;
-    if (l2.is_looked_up_as_is(request)) {
+    if (at == request.address && l2.is_in_one_line(request)) {
       complete = serve_in_line(request, arrival, now);  // a copy would wait for the stores that have just made it
     } else {
-      const MemoryRequest wanted = l2.looked_up_as(request);
-      l2.for_each_line(wanted, [&](std::uint64_t address, std::uint32_t bytes) {
-        const MemoryRequest part{address, bytes, wanted.command, wanted.origin};
+      l2.for_each_line(at, request.bytes, [&](std::uint64_t address, std::uint32_t bytes) {
+        const MemoryRequest part{address, bytes, request.command, request.origin};
         complete = std::max(complete, serve_in_line(part, arrival, now));
       });
     }

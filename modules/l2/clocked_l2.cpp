@@ -89,7 +89,16 @@ class ClockedL2::Port final : public ClockedTarget {
   }
   bool take(const MemoryRequest& request, const Asker& asker, Cycle arrival) override {
     const std::uint32_t made = l2_.make_request();
-    l2_.requests_[made] = {l2_.behaviour_->looked_up_as(request), asker, l2_.crossing_.edge_of(arrival), index_};
+    Request& taken = l2_.requests_[made];
+    taken = Request();
+    // One by one: all at once they would wait for the stores that have just made them.
+    taken.access.address = l2_.behaviour_->looked_up_at(request);
+    taken.access.bytes = request.bytes;
+    taken.access.command = request.command;
+    taken.access.origin = request.origin;
+    taken.asker = asker;
+    taken.arrival = l2_.crossing_.edge_of(arrival);
+    taken.port = index_;
     give_back();
     if (free_ > 0) {
       admit(made);
@@ -152,7 +161,7 @@ inline void ClockedL2::queue_at_bank(std::uint32_t request) {
 
 void ClockedL2::queue_by_line(std::uint32_t request) {
   const MemoryRequest access = requests_[request].access;
-  behaviour_->for_each_line(access, [&](std::uint64_t address, std::uint32_t bytes) {
+  behaviour_->for_each_line(access.address, access.bytes, [&](std::uint64_t address, std::uint32_t bytes) {
     const std::uint32_t part = make_request();
     requests_[part] = requests_[request];
     requests_[part].access = {address, bytes, access.command, access.origin};

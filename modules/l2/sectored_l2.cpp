@@ -105,7 +105,7 @@ void SectoredL2::access(const MemoryRequest& request) {
   traffic_.count(request);
   const bool writes = request.command == tlm::TLM_WRITE_COMMAND;
   const bool certain = is_certain(request);
-  for_each_line(looked_up_as(request), [&](std::uint64_t address, std::uint32_t bytes) {
+  for_each_line(looked_up_at(request), request.bytes, [&](std::uint64_t address, std::uint32_t bytes) {
     if (passes(request)) {
       if (below_ != nullptr) below_->access(below_as({address, bytes, request.command, request.origin, certain}));
       if (certain) count_bank(bank_of(address), bytes);

@@ -144,14 +144,11 @@ class SectoredL2 final : public MemoryBehaviour {
 
   // For timing models.
 
-  /// The request that its look-up is for: where it does not see all writes, addresses of other contents are others.
-  MemoryRequest looked_up_as(MemoryRequest request) const {
-    if (!sees_all_writes_) request.address |= std::uint64_t{request.origin.round} << round_shift;
-    return request;
+  /// The address that a request is looked up at: where it does not see all writes, other contents are at others.
+  std::uint64_t looked_up_at(const MemoryRequest& request) const {
+    return sees_all_writes_ ? request.address : request.address | std::uint64_t{request.origin.round} << round_shift;
   }
-  /// Whether that is itself, and lies in one line.
-  bool is_looked_up_as_is(const MemoryRequest& request) const { return sees_all_writes_ && is_in_one_line(request); }
-  /// And the one that goes below.
+  /// The request that goes below for one that was looked up.
   MemoryRequest below_as(MemoryRequest request) const {
     if (!sees_all_writes_) request.address &= (std::uint64_t{1} << round_shift) - 1;
     return request;
@@ -211,11 +208,11 @@ class SectoredL2 final : public MemoryBehaviour {
   bool is_in_one_line(const MemoryRequest& request) const {
     return (request.address & last_of_line_) + request.bytes <= last_of_line_ + 1;
   }
-  /// Calls `piece(address, bytes)` with the part of a request in each line.
+  /// Calls `piece(address, bytes)` with the part in each line of so many bytes from an address on.
   template <class Piece>
-  void for_each_line(const MemoryRequest& request, Piece&& piece) const {
-    for (std::uint64_t address = request.address; address < request.address + request.bytes;) {
-      const std::uint64_t end = std::min(request.address + request.bytes, (address | last_of_line_) + 1);
+  void for_each_line(std::uint64_t address, std::uint64_t bytes, Piece&& piece) const {
+    for (const std::uint64_t past = address + bytes; address < past;) {
+      const std::uint64_t end = std::min(past, (address | last_of_line_) + 1);
       piece(address, static_cast<std::uint32_t>(end - address));
       address = end;
     }

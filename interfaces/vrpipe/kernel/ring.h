@@ -36,7 +36,7 @@ class Ring {
 
  private:
   template <class Member>
-  [[gnu::noinline]] void insert_in_order(Entry entry, Member key) {
+  [[gnu::noinline]] void insert_in_order(const Entry& entry, Member key) {
     push();
     std::size_t place = size() - 1;
     for (; place > 0 && entry.*key < (*this)[place - 1].*key; --place) (*this)[place] = (*this)[place - 1];

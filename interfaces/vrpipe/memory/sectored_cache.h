@@ -243,10 +243,7 @@ class SectoredCache {
   struct Shadow;
 
   /// Lines that follow one another have neighbouring chains.
-  std::size_t chain_of(std::uint64_t tag) const {
-    const std::uint64_t block = tag >> (64 - chain_shift_);
-    return (tag ^ (block * 0x9e3779b97f4a7c15ULL) >> chain_shift_) & (chains_.size() - 1);
-  }
+  std::size_t chain_of(std::uint64_t tag) const { return (tag ^ tag >> chain_bits_) & last_chain_; }
   std::uint32_t set_of_tag(std::uint64_t tag) const {
     const Interleaving::Share share = interleaving_.share(tag);
     return organization_.hashes_sets ? interleaving_.hashed_place<Interleaving::all_digits>(share) : share.place;
@@ -335,7 +332,8 @@ class SectoredCache {
   std::uint32_t ways_;
   unsigned line_shift_;    ///< log2 of the bytes of a line
   unsigned sector_shift_;  ///< log2 of the bytes of a sector
-  unsigned chain_shift_;
+  unsigned chain_bits_;    ///< log2 of the chains
+  std::size_t last_chain_;
   Interleaving interleaving_{1};  ///< of lines, to sets
   std::uint64_t sector_bytes_;
   SectoredCacheStatistics* statistics_;
