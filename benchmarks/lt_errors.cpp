@@ -24,10 +24,9 @@
 #include <vrpipe/component/error.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/simulation.h>
-#include <vrpipe/workloads/draw_list.h>
 #include <vrpipe/workloads/scene.h>
 
-#include "support/data.h"
+#include "support/measured_scenes.h"
 #include "support/random_choices.h"
 
 namespace vrpipe {
@@ -47,7 +46,7 @@ Scene window_of(const Draw& real, std::uint32_t left, std::uint32_t top, std::ui
 
 std::vector<Scene> load_scenes(bool is_short) {
   std::vector<Scene> scenes;
-  const Draw real = read_draw_list(testing::UnpackedFile("measured_draw.spl").path()).draw;
+  const Draw real = testing::measured_draw();
   if (is_short) return {window_of(real, 360, 360, 32)};
   scenes.push_back(window_of(real, 360, 360, 64));
   scenes.push_back(window_of(real, 250, 420, 80));

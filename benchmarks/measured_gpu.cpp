@@ -17,10 +17,9 @@
 #include <vector>
 
 #include <vrpipe/arithmetic/random.h>
-#include <vrpipe/workloads/draw_list.h>
 
 #include "measured/gpu.h"
-#include "support/data.h"
+#include "support/measured_scenes.h"
 
 namespace vrpipe::measured {
 
@@ -158,8 +157,7 @@ int main(int argc, char** argv) try {
   if (is_in_shader) vrpipe::measured::compare_in_shader(gpu, is_short);
   if (is_passes) vrpipe::measured::compare_passes(gpu, is_short);
   if (is_synthetic || is_uniform || is_in_shader || is_passes) return 0;
-  const vrpipe::testing::UnpackedFile file("measured_draw.spl");
-  vrpipe::Draw draw = vrpipe::read_draw_list(file.path()).draw;
+  vrpipe::Draw draw = vrpipe::testing::measured_draw();
   if (is_short) draw.splats.resize(draw.splats.size() / 200);
   vrpipe::measured::compare_modes(gpu, draw);
   vrpipe::measured::compare_orders(gpu, draw);

@@ -5,9 +5,8 @@
 #include <exception>
 
 #include <vrpipe/platforms/simulation.h>
-#include <vrpipe/workloads/draw_list.h>
 
-#include "support/data.h"
+#include "support/measured_scenes.h"
 
 namespace vrpipe::measured {
 
@@ -31,8 +30,7 @@ inline int run_of_measured_draw(const char* program, int argc, char** argv,
     std::fprintf(stderr, "%s: functional has no time\n", program);
     return 2;
   }
-  const testing::UnpackedFile file("measured_draw.spl");
-  Draw draw = read_draw_list(file.path()).draw;
+  Draw draw = testing::measured_draw();
   if (is_short) draw.splats.resize(draw.splats.size() / 200);
   compare(draw, fidelity);
   return 0;

@@ -1,6 +1,7 @@
 #include "measured/gpu.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <stdexcept>
 #include <vector>
 
@@ -65,6 +66,10 @@ RunResult Gpu::run(const Draw& draw, const Mode& mode) const {
   const auto frame = multi_pass_frame(mode.off_screen ? moved : draw, state, mode.passes);
   fresh_simulation();
   return simulate(request, *frame);
+}
+
+void print_in_columns(int width, int digits, double measured, double predicted) {
+  std::printf("%*.*f%*.*f%+7.1f", width, digits, measured, width, digits, predicted, percent(predicted, measured));
 }
 
 }  // namespace vrpipe::measured

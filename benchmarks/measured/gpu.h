@@ -42,6 +42,8 @@ class Gpu {
 };
 
 inline double percent(double predicted, double measured) { return 100 * (predicted / measured - 1); }
+/// What was measured, what is predicted, in columns of a width, and how many percent that is off.
+void print_in_columns(int width, int digits, double measured, double predicted);
 
 /// Scenes of synthetic splats. `is_short`: a part of the smallest, to see that it works.
 void compare_scenes(const Gpu& gpu, bool is_short);

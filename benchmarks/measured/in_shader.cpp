@@ -3,10 +3,7 @@
 #include <cstdio>
 #include <string>
 
-#include <vrpipe/workloads/draw_list.h>
-
 #include "measured/gpu.h"
-#include "support/data.h"
 #include "support/measured_scenes.h"
 
 namespace vrpipe::measured {
@@ -30,10 +27,6 @@ double wrong_pixels(const ColorSurface& image, const ColorSurface& reference) {
   return 100 * wrong / (static_cast<double>(image.width()) * image.height());
 }
 
-void print(double measured, double predicted) {
-  std::printf("%9.2f%9.2f%+7.1f", measured, predicted, percent(predicted, measured));
-}
-
 void compare(const Gpu& gpu, const MeasuredScene& scene) {
   const RunResult rop = gpu.run(scene.draw, mode_named("RGBA16F"));
   const RunResult ordered = gpu.run(scene.draw, mode_named("in the shader"));
@@ -43,10 +36,10 @@ void compare(const Gpu& gpu, const MeasuredScene& scene) {
   const auto region = scene.values.find("region");
   std::printf("%-10s%6s", scene.name.c_str(),
               region == scene.values.end() ? "" : std::to_string(static_cast<int>(region->second)).c_str());
-  print(cycles("ordered"), with);
-  print(cycles("ordered") / cycles("rop"), with / of_rop);
-  print(cycles("no_lock"), without);
-  print(cycles("no_lock") / cycles("rop"), without / of_rop);
+  print_in_columns(9, 2, cycles("ordered"), with);
+  print_in_columns(9, 2, cycles("ordered") / cycles("rop"), with / of_rop);
+  print_in_columns(9, 2, cycles("no_lock"), without);
+  print_in_columns(9, 2, cycles("no_lock") / cycles("rop"), without / of_rop);
   const auto wrong = scene.values.find("wrong");
   if (wrong != scene.values.end())
     std::printf("%8.1f%8.1f", 100 * wrong->second, wrong_pixels(racing.framebuffer.color, ordered.framebuffer.color));
@@ -79,10 +72,7 @@ void compare_in_shader(const Gpu& gpu, bool is_short) {
   std::printf("%8s%8s\n", "meas.", "pred.");
   for (MeasuredScene& scene : testing::measured_in_shader_scenes()) {
     if (is_short && scene.name != "8x8" && scene.name != "trained") continue;
-    if (scene.name == "trained") {
-      const testing::UnpackedFile file("measured_draw.spl");
-      scene.draw = read_draw_list(file.path()).draw;
-    }
+    if (scene.name == "trained") scene.draw = testing::measured_draw();
     if (is_short) scene.draw.splats.resize(scene.draw.splats.size() / 200);
     compare(gpu, scene);
     if (scene.name == "trained") compare_clocks(gpu, scene.draw);

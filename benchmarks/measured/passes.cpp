@@ -5,10 +5,7 @@
 #include <string>
 #include <utility>
 
-#include <vrpipe/workloads/draw_list.h>
-
 #include "measured/gpu.h"
-#include "support/data.h"
 #include "support/measured_scenes.h"
 
 namespace vrpipe::measured {
@@ -31,13 +28,7 @@ double updates_alone(const Gpu& gpu, const Draw& draw, std::uint32_t passes) {
 }
 
 Draw draw_of(const std::string& scene) {
-  if (scene != "trained") return testing::measured_scene(scene).draw;
-  const testing::UnpackedFile file("measured_draw.spl");
-  return read_draw_list(file.path()).draw;
-}
-
-void print(double measured, double predicted, int digits) {
-  std::printf("%10.*f%10.*f%+7.1f", digits, measured, digits, predicted, percent(predicted, measured));
+  return scene == "trained" ? testing::measured_draw() : testing::measured_scene(scene).draw;
 }
 
 }  // namespace
@@ -62,15 +53,16 @@ void compare_passes(const Gpu& gpu, bool is_short) {
     std::printf("%-10s%7u", row.name.c_str(), passes);
     const bool is_counted = row.values.count("fragments") != 0;
     if (is_counted) {
-      print(row.values.at("fragments") / 1e6, static_cast<double>(result.counts.fragments_shaded) / 1e6, 2);
-      print(row.values.at("cycles_with_barrier"), predicted, 3);
+      print_in_columns(10, 2, row.values.at("fragments") / 1e6,
+                       static_cast<double>(result.counts.fragments_shaded) / 1e6);
+      print_in_columns(10, 3, row.values.at("cycles_with_barrier"), predicted);
     } else {
       std::printf("%54s", "");
     }
     const double of_other = row.values.at("cycles");
     std::printf("%10.3f%+7.1f", of_other, percent(predicted, of_other));
     if (row.values.count("updates_alone") != 0)
-      print(row.values.at("updates_alone"), updates_alone(gpu, draw, passes), 3);
+      print_in_columns(10, 3, row.values.at("updates_alone"), updates_alone(gpu, draw, passes));
     std::printf("\n");
     std::fflush(stdout);
     sum += std::fabs(percent(predicted, is_counted ? row.values.at("cycles_with_barrier") : of_other));

@@ -107,7 +107,7 @@ SectoredCache::Line SectoredCache::allocate(std::uint64_t address, Evicted& evic
   entry.note = 0;
   seen_[line] = details_ ? &were_there_.of(tag) : everything_.data();
   Line& chain = chains_[chain_of(tag)];
-  links_[line].next = chain;
+  entry.next = chain;
   chain = line;
   if (is_masked()) {
     const std::size_t words = mask_words(organization_);
@@ -132,19 +132,19 @@ SectoredCache::Line SectoredCache::victim(std::uint32_t set) {
     case Replacement::lru: break;
     case Replacement::fifo: {
       Line line = sets_[set].oldest;
-      while (lines_[line].pins != 0) line = links_[line].newer;
+      while (links_[line].pins != 0) line = links_[line].newer;
       return line;
     }
     case Replacement::random: {
       std::uint64_t before = mix(organization_.random_seed + evictions_) % (ways_ - sets_[set].pinned);
       if (sets_[set].pinned == 0) return line_of(set, static_cast<std::uint32_t>(before));
       for (std::uint32_t way = 0;; ++way) {
-        if (lines_[line_of(set, way)].pins == 0 && before-- == 0) return line_of(set, way);
+        if (links_[line_of(set, way)].pins == 0 && before-- == 0) return line_of(set, way);
       }
     }
     case Replacement::tree_plru: {
       const bool all_can = sets_[set].pinned == 0;
-      return victim_of_tree(set, [&](Line line) { return all_can || lines_[line].pins == 0; });
+      return victim_of_tree(set, [&](Line line) { return all_can || links_[line].pins == 0; });
     }
   }
   return sets_[set].oldest;
@@ -178,7 +178,7 @@ SectoredCache::Line SectoredCache::victim_of_tree(std::uint32_t set, CanGo&& can
 }
 
 SectoredCache::Line SectoredCache::victim_not_kept(std::uint32_t set) const {
-  const auto can_go = [&](Line line) { return lines_[line].pins == 0 && !kept_[line]; };
+  const auto can_go = [&](Line line) { return links_[line].pins == 0 && !kept_[line]; };
   if (replacement_ == Replacement::lru || replacement_ == Replacement::fifo) {
     Line line = sets_[set].oldest;
     while (line != no_line && !can_go(line)) line = links_[line].newer;
@@ -210,14 +210,14 @@ void SectoredCache::take_out(Line line) {
   }
   if (replacement_ == Replacement::lru || replacement_ == Replacement::fifo) unlink(set, line);
   Line* at = &chains_[chain_of(entry.tag)];
-  while (*at != line) at = &links_[*at].next;
-  *at = links_[line].next;
+  while (*at != line) at = &lines_[*at].next;
+  *at = entry.next;
   entry.present = entry.filling = entry.dirty = 0;
 }
 
 void SectoredCache::invalidate(Line line) {
   Entry& entry = lines_[line];
-  if (entry.pins != 0) throw std::logic_error("a line was invalidated that is pinned");
+  if (links_[line].pins != 0) throw std::logic_error("a line was invalidated that is pinned");
   if (shadow_ != nullptr) {
     const Line shadow = shadow_->cache.find(address(line));
     if (shadow != no_line) shadow_->cache.invalidate(shadow);

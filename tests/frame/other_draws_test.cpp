@@ -7,9 +7,8 @@
 #include <gtest/gtest.h>
 
 #include <vrpipe/platforms/simulation.h>
-#include <vrpipe/workloads/draw_list.h>
 
-#include "support/data.h"
+#include "support/measured_scenes.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
@@ -24,8 +23,7 @@ INSTANTIATE_TEST_SUITE_P(Frame, OtherDraws, ::testing::Values("agx-orin", "gh100
 
 // A draw that was tested late, anywhere behind it, made a draw 3.5 % longer on gh100-gpc.
 TEST_P(OtherDraws, TakeAsLongWhateverADrawBehindThemCallsFor) {
-  const testing::UnpackedFile file("measured_draw.spl");
-  const Draw draw = read_draw_list(file.path()).draw;
+  const Draw draw = testing::measured_draw();
   RunRequest request = request_of("baseline", Fidelity::cycle);
   request.platform = &platform_named(GetParam());
   DrawState plain = draw_state_of(request);

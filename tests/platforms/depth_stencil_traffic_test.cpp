@@ -6,12 +6,11 @@
 
 #include <vrpipe/platforms/foreign_memory.h>
 #include <vrpipe/platforms/wiring.h>
-#include <vrpipe/workloads/draw_list.h>
 #include <vrpipe/workloads/scene.h>
 
-#include "support/data.h"
 #include "support/fidelities.h"
 #include "support/foreign_memory.h"
+#include "support/measured_scenes.h"
 #include "support/mixed_frames.h"
 #include "support/simulate.h"
 
@@ -309,8 +308,7 @@ TEST(DepthStencilTraffic, ACacheOfOneLineTakesChangesOfSeveral) {
 
 // Of a real GPU's draw; at lt flits of second looks, which come later, held up the first looks behind them.
 TEST(DepthStencilTraffic, TagsAreLookedAtAsFarAheadAtLtAsAtCycle) {
-  const testing::UnpackedFile file("measured_draw.spl");
-  const Draw draw = read_draw_list(file.path()).draw;
+  const Draw draw = testing::measured_draw();
   std::map<Fidelity, double> reads;
   for (const Fidelity fidelity : {Fidelity::lt, Fidelity::cycle}) {
     RunRequest request = request_of("baseline", fidelity);

@@ -4,10 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <vrpipe/component/error.h>
-#include <vrpipe/workloads/draw_list.h>
 #include <vrpipe/workloads/multi_pass.h>
 
-#include "support/data.h"
 #include "support/measured_scenes.h"
 #include "support/simulate.h"
 
@@ -121,10 +119,7 @@ TEST(InShaderMeasured, TimesAreThoseOfTheGpu) {
     const bool is_short =
         scene.values.count("region") != 0 && scene.values["region"] == 1024 && scene.values["rop"] < 1e6;
     if (!is_trained && !is_short) continue;
-    if (is_trained) {
-      const testing::UnpackedFile file("measured_draw.spl");
-      scene.draw = read_draw_list(file.path()).draw;
-    }
+    if (is_trained) scene.draw = testing::measured_draw();
     const auto cycles = [&](const char* variant) {
       RunRequest request = on("gh100-gpc", variant, Fidelity::lt);
       request.settings = {{"state", "obb_padding", "0"}};

@@ -7,9 +7,9 @@
 #include <gtest/gtest.h>
 
 #include <vrpipe/arithmetic/half.h>
-#include <vrpipe/workloads/draw_list.h>
 
 #include "support/data.h"
+#include "support/measured_scenes.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
@@ -18,8 +18,7 @@ namespace {
 class MeasuredDraw : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    const testing::UnpackedFile file("measured_draw.spl");
-    draw = std::make_unique<Draw>(read_draw_list(file.path()).draw);
+    draw = std::make_unique<Draw>(testing::measured_draw());
     result = std::make_unique<RunResult>(testing::run(request_of(Fidelity::functional), *draw));
   }
   /// On the platform that is after that GPU. The list has the boxes that were drawn there: nothing is added to them.

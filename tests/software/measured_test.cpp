@@ -9,10 +9,8 @@
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/workloads/draw_list.h>
-
 #include "software/software_statistic.h"
-#include "support/data.h"
+#include "support/measured_scenes.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
@@ -22,10 +20,7 @@ using testing::software_statistic;
 
 class MeasuredSoftware : public ::testing::Test {
  protected:
-  static void SetUpTestSuite() {
-    const testing::UnpackedFile file("measured_draw.spl");
-    draw = std::make_unique<Draw>(read_draw_list(file.path()).draw);
-  }
+  static void SetUpTestSuite() { draw = std::make_unique<Draw>(testing::measured_draw()); }
   static void TearDownTestSuite() { draw.reset(); }
 
   static SoftwareResult render(const char* lists, const char* kernel, const char* sms = "4",

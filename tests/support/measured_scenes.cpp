@@ -5,6 +5,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include <vrpipe/workloads/draw_list.h>
 #include <vrpipe/workloads/measured_splats.h>
 
 #include "support/data.h"
@@ -47,6 +48,11 @@ std::uint64_t MeasuredScene::count(const std::string& column) const {
 }
 
 const std::vector<std::string>& measured_scene_names() { return measured::synthetic_scene_names(); }
+
+Draw measured_draw() {
+  const UnpackedFile file("measured_draw.spl");
+  return read_draw_list(file.path()).draw;
+}
 
 MeasuredScene measured_scene(const std::string& name) {
   for (MeasuredScene& scene : rows_of(data_file("measured_scenes.csv"))) {

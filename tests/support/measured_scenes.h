@@ -18,6 +18,9 @@ struct MeasuredScene {
   std::uint64_t count(const std::string& column) const;
 };
 
+/// The trained scene that was (tests/data/README.md).
+Draw measured_draw();
+
 /// Three scenes of splats of all sizes, some in clusters (tests/data/measured_scenes.csv: counts, and millions of cycles).
 MeasuredScene measured_scene(const std::string& name);
 const std::vector<std::string>& measured_scene_names();

@@ -4,11 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <vrpipe/platforms/software.h>
-#include <vrpipe/workloads/draw_list.h>
 
 #include "jobs/energy.h"
 #include "jobs/frame_energy.h"
-#include "support/data.h"
+#include "support/measured_scenes.h"
 #include "support/simulate.h"
 
 namespace vrpipe::testing {
@@ -19,10 +18,7 @@ using tools::EnergyTable;
 
 class MeasuredEnergy : public ::testing::Test {
  protected:
-  MeasuredEnergy() {
-    const UnpackedFile file("measured_draw.spl");
-    draw_ = read_draw_list(file.path()).draw;
-  }
+  MeasuredEnergy() : draw_(measured_draw()) {}
   static RunRequest request(const char* variant) {
     RunRequest request;
     request.platform = &platform_named("gh100-gpc");

@@ -10,7 +10,7 @@
 
 #include <vrpipe/workloads/draw_list.h>
 
-#include "support/data.h"
+#include "support/measured_scenes.h"
 #include "walk/isolated.h"
 
 namespace {
@@ -137,7 +137,7 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   setenv("SYSTEMC_DISABLE_COPYRIGHT_MESSAGE", "1", 1);
 
-  const Draw real = read_draw_list(vrpipe::testing::UnpackedFile("measured_draw.spl").path()).draw;
+  const Draw real = vrpipe::testing::measured_draw();
   if (!options.only) return walk_along(options, real, limits);
   const Case c = draw_case(options.seed, *options.only, real);
   const std::vector<Finding> findings = judged_apart(c, limits);

@@ -6,11 +6,10 @@
 #include <ostream>
 #include <set>
 
-#include <vrpipe/workloads/draw_list.h>
 #include <vrpipe/workloads/preprocess.h>
 
-#include "../support/data.h"
 #include "../support/draw_statistics.h"
+#include "../support/measured_scenes.h"
 #include "../support/reference_renderer.h"
 #include "workload_test_support.h"
 
@@ -200,8 +199,7 @@ void expect_as_trained(const testing::DrawStatistics& draw, const std::string& k
 }
 
 TEST(TrainedScenes, TheRobotOfTheTestsIsWhereTheOthersAre) {
-  const testing::UnpackedFile file("measured_draw.spl");
-  expect_as_trained(testing::statistics_of(read_draw_list(file.path()).draw), "synthetic");
+  expect_as_trained(testing::statistics_of(testing::measured_draw()), "synthetic");
 }
 
 struct StandInMarks {

@@ -33,7 +33,7 @@ class BandwidthReservation {
 
   /// Reserves for an access that arrives in a cycle. `present` is the cycle of the clock, and never decreases. Returns
   /// the first cycle at whose beginning all of its bytes have moved.
-  Cycle take(Cycle arrival, unsigned bytes, Cycle present) {
+  [[gnu::always_inline]] Cycle take(Cycle arrival, unsigned bytes, Cycle present) {
     if (arrival < no_gap_from_) return take_gaps(arrival, bytes, present);
     const std::uint64_t begin = arrival * per_cycle_.value();
     if (begin > end_) begin_run(arrival, present);

@@ -41,7 +41,7 @@ class SectoredCache {
   Line find(std::uint64_t address) const {
     const std::uint64_t tag = address >> line_shift_;
     Line line = chains_[chain_of(tag)];
-    while (line != no_line && lines_[line].tag != tag) line = links_[line].next;
+    while (line != no_line && lines_[line].tag != tag) line = lines_[line].next;
     return line;
   }
   /// Brings what `find` reads of an address to the host's cache. Tags of a large cache are beyond its first ones.
@@ -77,16 +77,16 @@ class SectoredCache {
 
   /// Holds a line fast, as one with fills on their way has to be.
   void pin(Line line) {
-    Entry& entry = lines_[line];
-    if (entry.pins++ != 0) return;
-    Set& set = sets_[links_[line].set];
+    Links& links = links_[line];
+    if (links.pins++ != 0) return;
+    Set& set = sets_[links.set];
     ++set.pinned;
     if (replacement_ == Replacement::lru) unlink(set, line);
   }
   void unpin(Line line) {
-    Entry& entry = lines_[line];
-    if (--entry.pins != 0) return;
-    Set& set = sets_[links_[line].set];
+    Links& links = links_[line];
+    if (--links.pins != 0) return;
+    Set& set = sets_[links.set];
     --set.pinned;
     if (replacement_ == Replacement::lru) return make_newest(set, line);
     use(line);
@@ -94,7 +94,7 @@ class SectoredCache {
 
   /// As if it was pinned and let go.
   void touch(Line line) {
-    if (lines_[line].pins == 0) use(line);
+    if (links_[line].pins == 0) use(line);
   }
 
   std::uint32_t present(Line line) const { return lines_[line].present; }
@@ -222,14 +222,14 @@ class SectoredCache {
     std::uint32_t present = 0;
     std::uint32_t filling = 0;
     std::uint32_t dirty = 0;
-    std::uint32_t pins = 0;
+    Line next = no_line;  ///< of the chain
   };
-  /// Where it stands.
+  /// Where it stands in its set.
   struct Links {
     Line newer = no_line;
     Line older = no_line;
-    Line next = no_line;  ///< of the chain
     std::uint32_t set = 0;
+    std::uint32_t pins = 0;
   };
   struct Set {
     Line newest = no_line;  ///< lru: of the lines that are not pinned, by use; fifo: of all, by allocation
@@ -268,7 +268,7 @@ class SectoredCache {
   void use(Line line) {
     Set& set = sets_[links_[line].set];
     if (replacement_ == Replacement::lru) {
-      if (line == set.newest || lines_[line].pins != 0) return;
+      if (line == set.newest || links_[line].pins != 0) return;
       unlink(set, line);
       make_newest(set, line);
     } else if (replacement_ == Replacement::tree_plru) {
