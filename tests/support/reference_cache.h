@@ -32,7 +32,7 @@ class ReferenceCache {
   }
 
   struct Outcome {
-    std::uint64_t line = 0;  ///< its place, set by set
+    std::uint64_t line = 0;  ///< its place, way by way
     bool replaced = false;
     std::set<unsigned> filled, missed, written_back;  ///< sectors
     std::uint64_t old_address = 0;
@@ -155,7 +155,7 @@ class ReferenceCache {
       *way = {line_of(address), std::vector<bool>(shape_.line_bytes), {}, 0, false, ++time_, time_};
       turn_away(set_of(address), static_cast<std::size_t>(way - set.data()));
     }
-    outcome.line = set_of(address) * ways_ + static_cast<std::size_t>(way - set.data());
+    outcome.line = static_cast<std::size_t>(way - set.data()) * sets_.size() + set_of(address);
 
     std::set<unsigned> of_missed_earlier;
     const std::uint64_t begin = address % shape_.line_bytes;

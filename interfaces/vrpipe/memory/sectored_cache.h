@@ -24,6 +24,7 @@ namespace vrpipe {
 /// and when it is accessed at once; so both ways give the same order while those who pin a line first unpin it first.
 class SectoredCache {
  public:
+  /// Of each set the one in way 0, then those in way 1, ...
   using Line = std::uint32_t;
   static constexpr Line no_line = ~0U;
 
