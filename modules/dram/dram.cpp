@@ -30,6 +30,7 @@ Dram::Dram(const DramParameters& parameters, const RenderContext& context)
 
 void Dram::access(const MemoryRequest& request) {
   count(request);
+  if (!counts_least_) return;
   if (channels_.empty()) {
     channels_.resize(settings_.channels);
     for (Channel& channel : channels_) channel.written.assign(settings_.timing.write_queue, ~std::uint64_t{0});

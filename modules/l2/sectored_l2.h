@@ -155,9 +155,7 @@ class SectoredL2 final : public MemoryBehaviour {
   }
   bool writes_through() const { return writes_through_; }
   /// Whether a request goes below without a look-up.
-  bool passes(const MemoryRequest& request) const {
-    return writes_through_ && request.command == tlm::TLM_WRITE_COMMAND;
-  }
+  bool passes(const MemoryRequest& request) const { return writes_through_ && is_write(request); }
   /// Of a piece of a request.
   std::uint32_t bank_of(std::uint64_t address) const { return bank_of_set(cache_.set_of(address)); }
   std::uint32_t bank_of_line(SectoredCache::Line line) const { return bank_of_set(cache_.set_of_line(line)); }
@@ -200,10 +198,10 @@ class SectoredL2 final : public MemoryBehaviour {
   }
   /// Bytes on the way in and on the way out.
   std::uint32_t request_bytes(const MemoryRequest& request) const {
-    return request.command == tlm::TLM_WRITE_COMMAND ? request.bytes : sizes_.header_bytes;
+    return is_write(request) ? request.bytes : sizes_.header_bytes;
   }
   std::uint32_t response_bytes(const MemoryRequest& request) const {
-    return request.command == tlm::TLM_WRITE_COMMAND ? sizes_.header_bytes : request.bytes;
+    return is_write(request) ? sizes_.header_bytes : request.bytes;
   }
   bool is_in_one_line(const MemoryRequest& request) const {
     return (request.address & last_of_line_) + request.bytes <= last_of_line_ + 1;
@@ -234,6 +232,9 @@ class SectoredL2 final : public MemoryBehaviour {
   std::uint32_t bank_of_set(std::uint32_t set) const { return interleaving_.share(set).place; }
   /// Whether a bank has to serve the request whatever the order of accesses is.
   bool is_certain(const MemoryRequest& request) const;
+  static bool is_write(const MemoryRequest& request) { return request.command == tlm::TLM_WRITE_COMMAND; }
+  /// Of an access, the part in a line, at the address that it is looked up at.
+  void access_line(const MemoryRequest& part);
   struct OfTraffic {
     Counter sectors, misses;
   };

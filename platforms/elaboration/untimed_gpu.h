@@ -28,6 +28,7 @@ class UntimedGpu {
   /// ROPs draw into the framebuffer.
   UntimedGpu(const Configuration& configuration, Framebuffer& framebuffer);
 
+  const Configuration& configuration() const { return configuration_; }
   const std::vector<Placed>& units() const { return units_; }
   /// Those that find out what is accessed.
   const std::vector<PlacedMemory>& memories() const { return memories_; }

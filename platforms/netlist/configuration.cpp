@@ -96,8 +96,13 @@ DevicePrecision device_precision_of(const RunRequest& request) {
   return device_precision_from(parameters);
 }
 
-Configuration::Configuration(const RunRequest& request, const Frame& frame)
-    : request_(request), netlist_(gpcs_of(request)), elaborated_(netlist_.gpcs()) {
+Configuration::Configuration(const RunRequest& request, const Frame& frame) : Configuration(request, frame, nullptr) {}
+
+Configuration::Configuration(const RunRequest& request, const Frame& part, const Configuration& whole)
+    : Configuration(request, part, whole.facts_) {}
+
+Configuration::Configuration(const RunRequest& request, const Frame& frame, std::shared_ptr<const FrameFacts> facts)
+    : request_(request), netlist_(gpcs_of(request)), elaborated_(netlist_.gpcs()), facts_(std::move(facts)) {
   // Of the program itself; a plugin's are reported when it is loaded.
   const std::vector<Registry::Problem> problems = Registry::instance().take_problems();
   if (!problems.empty()) {
@@ -135,6 +140,7 @@ Configuration::Configuration(const RunRequest& request, const Frame& frame)
     context.hands_on_coverage = all_know_coverage("sm", gpc) && all_know_coverage("crop", gpc);
     contexts_.push_back(context);
   }
+  if (facts_ == nullptr) facts_ = std::make_shared<FrameFacts>(contexts_.front());
   decide_effects();
   check_left_out();
 }

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <vrpipe/pipeline/frame_facts.h>
 #include <vrpipe/platforms/configuration.h>
 #include <vrpipe/platforms/observers.h>
 
@@ -96,7 +95,6 @@ void Configuration::decide_effects() {
     throw UserError("cannot leave out " + name, "--effects", effect_named(name).omitted_when, "do not name it");
   }
   elaborated_ = netlist_;
-  const FrameFacts facts(contexts_.front());
   const ParameterSet none;
   auto omitted = std::make_shared<OmittedEffects>();
   const bool has_time = vrpipe::has_time(request_.fidelity);
@@ -105,7 +103,7 @@ void Configuration::decide_effects() {
     for (const Link& link : netlist_.links()) observed_links += request_.observers->observes_link(link.name()) ? 1 : 0;
   }
   const auto question = [&](const Instance* instance) {
-    EffectQuestion asked{facts, contexts_[instance == nullptr ? 0 : instance->gpc],
+    EffectQuestion asked{*facts_, contexts_[instance == nullptr ? 0 : instance->gpc],
                          instance == nullptr ? none : *units_.at(instance->path).chosen_parameters};
     asked.has_time = has_time;
     asked.counts_work = request_.fidelity != Fidelity::functional;

@@ -10,26 +10,11 @@
 #include "elaboration/untimed_gpu.h"
 
 #include <vrpipe/arithmetic/random.h>
-#include <vrpipe/model/memory_unit.h>
-#include <vrpipe/platforms/configuration.h>
-#include <vrpipe/platforms/gpu.h>
 #include <vrpipe/platforms/netlist.h>
 
 namespace vrpipe {
 
 namespace {
-
-struct CounterName {
-  const char* slot;
-  const char* name;
-};
-/// What may bound a frame at one place or another, in the order of SampledWork.
-constexpr std::array<CounterName, counted_work_kinds> work_names{{{"raster", "raster_tiles_tested"},
-                                                                  {"raster", "raster_tiles_kept"},
-                                                                  {"raster", "screen_tile_pairs"},
-                                                                  {"raster", "setups"},
-                                                                  {"sm", "fragment_warps"},
-                                                                  {"crop", "quads_blended"}}};
 
 /// Of the course, in quads.
 constexpr double quads_of_step = 2048;
@@ -50,37 +35,6 @@ const WindowFacts& facts_of(const RunRequest& request) {
   return request.variant.early_termination ? facts_with_termination : facts_without_termination;
 }
 
-/// When a count that is looked at now and then reaches a value.
-class Passing {
- public:
-  explicit Passing(double value) : value_(value) {}
-  bool has_been() const { return has_been_; }
-  double cycle() const { return cycle_; }
-  /// Between two looks it goes on evenly.
-  void look(double count, double cycle) {
-    if (!has_been_ && count >= value_) {
-      has_been_ = true;
-      const double share = count > count_before_ ? (count - value_) / (count - count_before_) : 0;
-      cycle_ = cycle - share * (cycle - cycle_before_);
-    }
-    count_before_ = count;
-    cycle_before_ = cycle;
-  }
-
- private:
-  double value_;
-  double cycle_ = 0;
-  double count_before_ = 0, cycle_before_ = 0;
-  bool has_been_ = false;
-};
-
-/// Quads that nobody does anything with any more.
-std::uint64_t retired(const Counts& counts) {
-  return counts.quads_depth_stencil_failed + counts.quads_terminated + counts.quads_unshaded + counts.quads_pruned +
-         counts.quads_merged + counts.quads_dropped_late + counts.quads_late_failed + counts.quads_unblended +
-         counts.quads_blended;
-}
-
 /// The share of a range around a centre that is from 0 to `size`.
 double share_on_screen(double center, double extent, double size) {
   return std::max(0.0, std::min(center + extent, size) - std::max(center - extent, 0.0)) / std::max(2 * extent, 1e-9);
@@ -96,44 +50,6 @@ double estimated_quads(const Splat& splat, const Frame& frame) {
 }
 
 }  // namespace
-
-FrameProgress::FrameProgress(const UntimedGpu& gpu) {
-  for (const UntimedGpu::Placed& placed : gpu.units()) add(placed.instance->slot, placed.unit->behaviour());
-}
-
-FrameProgress::FrameProgress(const Gpu& gpu) {
-  for (const Gpu::Placed& placed : gpu.units()) add(placed.instance->slot, *placed.behaviour);
-}
-
-void FrameProgress::add(const std::string& slot, const Behaviour& behaviour) {
-  behaviours_.push_back(&behaviour.unit());
-  for (const Counter* const counter : behaviours_.back()->counters()) {
-    const auto is = [&](const CounterName& name) { return slot == name.slot && counter->name() == name.name; };
-    if (is({"draw", "splats"})) splats_.push_back(counter);
-    if (is({"raster", "quads_rasterized"})) quads_.push_back(counter);
-    for (std::size_t kind = 0; kind < work_names.size(); ++kind) {
-      if (is(work_names[kind])) work_[kind].push_back(counter);
-    }
-  }
-}
-
-std::uint64_t FrameProgress::sum(const Counters& counters) {
-  std::uint64_t sum = 0;
-  for (const Counter* const counter : counters) sum += counter->value();
-  return sum;
-}
-
-Counts FrameProgress::counts() const {
-  Counts counts;
-  for (const Behaviour* const behaviour : behaviours_) behaviour->add_to(counts, CountOf());
-  return counts;
-}
-
-SampledWork FrameProgress::work() const {
-  SampledWork work{};
-  for (std::size_t kind = 0; kind < work_.size(); ++kind) work[kind] = static_cast<double>(sum(work_[kind]));
-  return work;
-}
 
 std::optional<UserError> FrameSampler::obstacle(const RunRequest& request) {
   const auto refuse = [](const std::string& where, const std::string& why, const std::string& remedy) {
@@ -210,8 +126,8 @@ FrameSampler::FrameSampler(const RunRequest& request, const Frame& frame)
     return std::min(splat, frame.splats()) / splats_per_vertex_warp * splats_per_vertex_warp;
   };
   const double begin = measured_quads;
-  // The estimate may be a third too high without a window that reaches beyond the frame.
-  const double end = std::max(begin, 0.97 * estimated_quads_ - 4 * measured_quads);
+  // There the estimate may be five times too high without a window that reaches beyond the frame.
+  const double end = std::max(begin, estimated_quads_ - 4 * (warm_up_quads_ + measured_quads));
   const std::uint64_t strata = request.sampling->windows != 0 ? request.sampling->windows : facts_of(request).usual;
   const double length = (end - begin) / static_cast<double>(strata);
   windows_.push_back({0, splat_at(begin)});
@@ -244,65 +160,40 @@ void FrameSampler::take_step() {
 
 void FrameSampler::passed() {
   if (static_cast<double>(progress_->rasterized()) >= steps_.back().quads + quads_of_step) take_step();
-  while (next_ < windows_.size() && progress_->splats() >= windows_[next_].splat) simulate(windows_[next_++]);
+  while (next_ < windows_.size() && progress_->splats() >= windows_[next_].splat) begin(windows_[next_++]);
 }
 
-void FrameSampler::simulate(Window& window) {
+void FrameSampler::begin(Window& window) {
+  end_window();
   const bool is_first = &window == &windows_.front();
   own_.color = drawn_->color;
   own_.depth_stencil = drawn_->depth_stencil;
   if (!is_first) own_.depth_stencil.go_on();
-  const Frame part = frame_.part(static_cast<std::uint32_t>(progress_->splats()), frame_.splats());
-  const double from = is_first ? 0 : warm_up_quads_;
-  const Measured measured = measure(part, from, &window == &windows_.back());
-  window.cycles = measured.cycle_to - measured.cycle_from;
-  window.from = static_cast<double>(progress_->rasterized()) + from;
+  const SampledWindow::Range range{is_first ? 0 : warm_up_quads_, measured_quads, &window == &windows_.back()};
+  window.from = static_cast<double>(progress_->rasterized()) + range.from;
   window.to = window.from + measured_quads;
-  const std::uint64_t primitives = progress_->counts().primitives;
-  window.primitives_from = primitives + measured.primitives_from;
-  window.primitives_to = primitives + measured.primitives_to;
-  measured_ += window.cycles;
-  warm_up_ += measured.cycle_from;
+  window.primitives_from = window.primitives_to = progress_->counts().primitives;
+  under_way_ = &window;
+  run_ = std::make_unique<SampledWindow>(request_,
+                                         frame_.part(static_cast<std::uint32_t>(progress_->splats()), frame_.splats()),
+                                         range, *gpu_, own_);
 }
 
-/// Passes of the rasteriser and of the end of the pipeline, whose mean each is: the one alone would see what is between them fill
-/// and empty.
-FrameSampler::Measured FrameSampler::measure(const Frame& part, double from, bool to_end) {
-  constexpr Cycle looks_every = 64;
-  fresh_simulation();
-  Measured measured;
-  {
-    const Configuration configuration(request_, part);
-    Gpu gpu(configuration, own_);
-    for (const Gpu::PlacedMemory& placed : gpu.memories()) {
-      if (const MemoryBehaviour* const held = gpu_->memory(placed.instance->path))
-        placed.memory->behaviour().hold_as(*held);
-    }
-    const FrameProgress progress(gpu);
-    Passing in_from(from), in_to(from + measured_quads), out_from(from), out_to(from + measured_quads);
-    gpu.clock().look_between_edges(looks_every, [&](Cycle now) {
-      const Counts counts = progress.counts();
-      const auto in = static_cast<double>(counts.quads_rasterized);
-      const auto out = static_cast<double>(retired(counts));
-      const auto cycle = static_cast<double>(now);
-      for (Passing* const passing : {&in_from, &in_to}) passing->look(in, cycle);
-      for (Passing* const passing : {&out_from, &out_to}) passing->look(out, cycle);
-      if (!in_from.has_been()) measured.primitives_from = counts.primitives;
-      if (!in_to.has_been()) measured.primitives_to = counts.primitives;
-      if (!to_end && out_to.has_been()) gpu.clock().stop_at(now + 1);
-      return now + looks_every;
-    });
-    const auto end = static_cast<double>(gpu.run(nullptr));
-    kernel_events_ += gpu.clock().activations();
-    if (from > 0) measured.cycle_from = (in_from.cycle() + out_from.cycle()) / 2;
-    measured.cycle_to = to_end ? end : (in_to.cycle() + out_to.cycle()) / 2;
-    is_whole_ = is_whole_ && out_from.has_been() && (to_end || out_to.has_been());
-  }
-  fresh_simulation();
-  return measured;
+void FrameSampler::end_window() {
+  if (run_ == nullptr) return;
+  const SampledWindow::Measured measured = run_->result();
+  run_.reset();
+  under_way_->cycles = measured.cycle_to - measured.cycle_from;
+  under_way_->primitives_from += measured.primitives_from;
+  under_way_->primitives_to += measured.primitives_to;
+  measured_ += under_way_->cycles;
+  warm_up_ += measured.cycle_from;
+  kernel_events_ += measured.kernel_events;
+  is_whole_ = is_whole_ && measured.is_whole;
 }
 
 void FrameSampler::end() {
+  end_window();
   take_step();
   find_in_course();
   find_busiest();

@@ -1,51 +1,28 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
+#include "run/frame_progress.h"
 #include "run/sampled_time.h"
+#include "run/sampled_window.h"
 
 #include <vrpipe/component/error.h>
-#include <vrpipe/component/statistic.h>
-#include <vrpipe/pipeline/counts.h>
 #include <vrpipe/pipeline/frame.h>
 #include <vrpipe/pipeline/framebuffer.h>
-#include <vrpipe/pipeline/slots/behaviour.h>
 #include <vrpipe/platforms/simulation.h>
 
 namespace vrpipe {
 
-class Gpu;
 class UntimedGpu;
-
-/// How far a frame has come in a GPU, and with what work, by the counters of its units.
-class FrameProgress {
- public:
-  explicit FrameProgress(const UntimedGpu& gpu);
-  explicit FrameProgress(const Gpu& gpu);
-
-  std::uint64_t splats() const { return sum(splats_); }     ///< that DRAW has issued
-  std::uint64_t rasterized() const { return sum(quads_); }  ///< quads
-  /// What all units count.
-  Counts counts() const;
-  SampledWork work() const;
-
- private:
-  using Counters = std::vector<const Counter*>;
-  void add(const std::string& slot, const Behaviour& behaviour);
-  static std::uint64_t sum(const Counters& counters);
-  std::vector<const Behaviour*> behaviours_;
-  Counters splats_, quads_;
-  std::array<Counters, counted_work_kinds> work_;
-};
 
 /// The time of a frame by windows of it that are simulated at `cycle` while the frame is drawn without time: each on the
 /// framebuffer, and with the contents of caches, that all before it has left, and with a stretch before it in which the pipeline
 /// fills. The first is from the beginning on, the last to the end; the others are at random places, one in each of as many strata,
-/// of about equal numbers of quads.
+/// of about equal numbers of quads. One window at a time runs on a thread of its own, beside the frame.
 class FrameSampler {
  public:
   /// Why a run, or that of a frame, cannot be sampled; none if it can.
@@ -91,14 +68,9 @@ class FrameSampler {
     std::uint64_t primitives_from = 0, primitives_to = 0;  ///< issued before these
     double cycles = 0;
   };
-  /// Since it began to warm up.
-  struct Measured {
-    std::uint64_t primitives_from = 0, primitives_to = 0;
-    double cycle_from = 0, cycle_to = 0;
-  };
   void take_step();
-  void simulate(Window& window);
-  Measured measure(const Frame& part, double from, bool to_end);
+  void begin(Window& window);
+  void end_window();
   void find_in_course();
   void find_busiest();
   double quads_at_primitive(std::uint64_t primitive) const;
@@ -115,9 +87,11 @@ class FrameSampler {
   const Framebuffer* drawn_ = nullptr;
   std::optional<FrameProgress> progress_;
   std::vector<Step> steps_;
-  Framebuffer own_;
-  bool is_whole_ = true;               ///< every window was in the frame
-  double measured_ = 0, warm_up_ = 0;  ///< cycles
+  Framebuffer own_;  ///< of windows
+  Window* under_way_ = nullptr;
+  std::unique_ptr<SampledWindow> run_;  ///< of it; null where none is
+  bool is_whole_ = true;                ///< every window was in the frame
+  double measured_ = 0, warm_up_ = 0;   ///< cycles
   std::uint64_t kernel_events_ = 0;
 };
 

@@ -275,6 +275,7 @@ void run_untimed(const Configuration& configuration, std::atomic<float>* progres
   std::vector<std::unique_ptr<WorkCounter>> counters;
   std::optional<OtherSlots> others;
   if (result.request.fidelity == Fidelity::bound) {
+    for (const UntimedGpu::PlacedMemory& placed : gpu.memories()) placed.memory->count_least();
     const unsigned gpcs = configuration.netlist().gpcs();
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) bounds.emplace_back(configuration, gpu, gpc);
     others.emplace(gpu, configuration.frame().terminates_early() && bounds.front().terms().bins_vary);

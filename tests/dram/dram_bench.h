@@ -95,6 +95,7 @@ class DramBench {
     RenderContext context;
     context.clock_ps = period_ps_;
     behaviour = behaviour_as<Dram>(implementation_.make_behaviour(*parameters_, context));
+    behaviour->count_least();
   }
   sc_core::sc_time cycles(double count) const { return {count * period_ps_, sc_core::SC_PS}; }
   /// When each of the accesses of a unit is answered, at `cycle`.

@@ -44,6 +44,7 @@ class L2 {
     for (const auto& [name, value] : settings) parameters.set("l2", name, value);
     behaviour = std::make_unique<SectoredL2>(parameters, context_);
     behaviour->set_below(below);
+    behaviour->count_least();
   }
   void read(std::uint64_t address, std::uint32_t bytes, MemoryOrigin origin = {}) {
     behaviour->access({address, bytes, tlm::TLM_READ_COMMAND, origin});

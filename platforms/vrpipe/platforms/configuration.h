@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <vrpipe/component/parameter.h>
+#include <vrpipe/pipeline/frame_facts.h>
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/simulation.h>
@@ -106,6 +107,8 @@ class Configuration {
   /// Throws UserError for an unknown unit, link, parameter or value, and SimulationFault for a platform whose wiring
   /// throws something else.
   Configuration(const RunRequest& request, const Frame& frame);
+  /// Of a part of the frame of another one, in the same variant: it simulates the effects that the whole frame calls for.
+  Configuration(const RunRequest& request, const Frame& part, const Configuration& whole);
 
   /// The functional model of an instance. This configuration outlives it.
   std::unique_ptr<Behaviour> make(const Instance& instance) const;
@@ -141,6 +144,7 @@ class Configuration {
     std::unique_ptr<ParameterSet> chosen_parameters;
     std::unique_ptr<ParameterSet> real_parameters;
   };
+  Configuration(const RunRequest& request, const Frame& frame, std::shared_ptr<const FrameFacts> facts);
   void wire();
   void decide_effects();
   void check_left_out() const;
@@ -163,6 +167,7 @@ class Configuration {
   std::map<std::string, const Implementation*> absent_;  ///< what would be in slots that the platform does without
   StateParameters state_parameters_;
   std::vector<RenderContext> contexts_;  ///< by GPC
+  std::shared_ptr<const FrameFacts> facts_;
   std::vector<EffectReport> effects_;    ///< before the run
 };
 

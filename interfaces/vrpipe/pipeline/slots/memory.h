@@ -29,7 +29,10 @@ class MemoryBehaviour : public Behaviour {
   /// By `access`: to those above, and from the memory below.
   virtual MemoryBytes delivered() const { return {}; }
   virtual MemoryBytes memory_bytes() const { return {}; }
-  /// How long what was accessed keeps it busy at least, in cycles of a period in picoseconds: for `bound`.
+  // For `bound`:
+  /// From now on counts what `least_occupancy` follows from.
+  void count_least() { counts_least_ = true; }
+  /// How long what was accessed keeps it busy at least, in cycles of a period in picoseconds.
   virtual std::vector<OccupancyPart> least_occupancy(double /*period_ps*/) const { return {}; }
 
   struct TimingParameters {
@@ -40,6 +43,7 @@ class MemoryBehaviour : public Behaviour {
 
  protected:
   MemoryBehaviour* below_ = nullptr;
+  bool counts_least_ = false;
 };
 
 }  // namespace vrpipe
