@@ -37,10 +37,10 @@ struct SectoredCache::Shadow {
 
 SectoredCache::SectoredCache(const CacheOrganization& organization, SectoredCacheStatistics& statistics)
     : organization_(organization),
-      replacement_(organization.replacement),
       statistics_(&statistics),
       details_(statistics.has_details()) {
   organization.check("cache", "cache", "bytes");
+  order_ = order_of(organization);
   ways_ = organization.ways_of_a_set();
   line_shift_ = log2_of(organization.line_bytes);
   sector_shift_ = log2_of(organization.sector_bytes);
@@ -113,7 +113,7 @@ SectoredCache::Line SectoredCache::allocate(std::uint64_t address, Evicted& evic
     const std::size_t words = mask_words(organization_);
     std::fill_n(byte_masks_.begin() + static_cast<std::ptrdiff_t>(line * words), words, 0);
   }
-  if (replacement_ == Replacement::lru || replacement_ == Replacement::fifo) {
+  if (order_ == Order::list || order_ == Order::arrivals) {
     make_newest(set, line);
   } else {
     use(line);
@@ -127,27 +127,49 @@ SectoredCache::Line SectoredCache::free_line(std::uint32_t set) {
   return line_of(set, way++);
 }
 
-SectoredCache::Line SectoredCache::victim(std::uint32_t set) {
-  switch (replacement_) {
+SectoredCache::Order SectoredCache::order_of(const CacheOrganization& organization) {
+  switch (organization.replacement) {
     case Replacement::lru: break;
-    case Replacement::fifo: {
+    case Replacement::fifo: return Order::arrivals;
+    case Replacement::random: return Order::random;
+    case Replacement::tree_plru: return Order::tree;
+  }
+  return organization.ways_of_a_set() <= most_ways_without_list ? Order::last_use : Order::list;
+}
+
+SectoredCache::Line SectoredCache::victim(std::uint32_t set) {
+  const auto can_go = [&](Line line) { return links_[line].pins == 0; };
+  switch (order_) {
+    case Order::last_use: return longest_unused(set, can_go);
+    case Order::list: break;
+    case Order::arrivals: {
       Line line = sets_[set].oldest;
-      while (links_[line].pins != 0) line = links_[line].newer;
+      while (!can_go(line)) line = links_[line].newer;
       return line;
     }
-    case Replacement::random: {
+    case Order::random: {
       std::uint64_t before = mix(organization_.random_seed + evictions_) % (ways_ - sets_[set].pinned);
       if (sets_[set].pinned == 0) return line_of(set, static_cast<std::uint32_t>(before));
       for (std::uint32_t way = 0;; ++way) {
-        if (links_[line_of(set, way)].pins == 0 && before-- == 0) return line_of(set, way);
+        if (can_go(line_of(set, way)) && before-- == 0) return line_of(set, way);
       }
     }
-    case Replacement::tree_plru: {
+    case Order::tree: {
       const bool all_can = sets_[set].pinned == 0;
-      return victim_of_tree(set, [&](Line line) { return all_can || links_[line].pins == 0; });
+      return victim_of_tree(set, [&](Line line) { return all_can || can_go(line); });
     }
   }
   return sets_[set].oldest;
+}
+
+template <class CanGo>
+SectoredCache::Line SectoredCache::longest_unused(std::uint32_t set, CanGo&& can_go) const {
+  Line oldest = no_line;
+  for (std::uint32_t way = 0; way < ways_; ++way) {
+    const Line line = line_of(set, way);
+    if (can_go(line) && (oldest == no_line || links_[line].used() < links_[oldest].used())) oldest = line;
+  }
+  return oldest;
 }
 
 // Inner node n has children 2n and 2n + 1; way w is leaf `ways` + w.
@@ -179,7 +201,8 @@ SectoredCache::Line SectoredCache::victim_of_tree(std::uint32_t set, CanGo&& can
 
 SectoredCache::Line SectoredCache::victim_not_kept(std::uint32_t set) const {
   const auto can_go = [&](Line line) { return links_[line].pins == 0 && !kept_[line]; };
-  if (replacement_ == Replacement::lru || replacement_ == Replacement::fifo) {
+  if (order_ == Order::last_use) return longest_unused(set, can_go);
+  if (order_ == Order::list || order_ == Order::arrivals) {
     Line line = sets_[set].oldest;
     while (line != no_line && !can_go(line)) line = links_[line].newer;
     return line;
@@ -187,7 +210,7 @@ SectoredCache::Line SectoredCache::victim_not_kept(std::uint32_t set) const {
   std::uint32_t others = 0;
   for (std::uint32_t way = 0; way < ways_; ++way) others += can_go(line_of(set, way)) ? 1U : 0U;
   if (others == 0) return no_line;
-  if (replacement_ == Replacement::tree_plru) return victim_of_tree(set, can_go);
+  if (order_ == Order::tree) return victim_of_tree(set, can_go);
   std::uint64_t before = mix(organization_.random_seed + evictions_) % others;
   for (std::uint32_t way = 0;; ++way) {
     if (can_go(line_of(set, way)) && before-- == 0) return line_of(set, way);
@@ -208,7 +231,7 @@ void SectoredCache::take_out(Line line) {
     kept_[line] = false;
     --set.kept;
   }
-  if (replacement_ == Replacement::lru || replacement_ == Replacement::fifo) unlink(set, line);
+  if (order_ == Order::list || order_ == Order::arrivals) unlink(set, line);
   Line* at = &chains_[chain_of(entry.tag)];
   while (*at != line) at = &lines_[*at].next;
   *at = entry.next;
@@ -372,6 +395,7 @@ void SectoredCache::hold_as(const SectoredCache& other) {
   byte_masks_ = other.byte_masks_;
   held_ = other.held_;
   evictions_ = other.evictions_;
+  uses_ = other.uses_;
 }
 
 }  // namespace vrpipe

@@ -28,8 +28,12 @@ CacheOrganization some_organization() {
   made.replacement =
       *rc::gen::element(Replacement::lru, Replacement::fifo, Replacement::random, Replacement::tree_plru);
   const bool tree = made.replacement == Replacement::tree_plru;
-  std::uint32_t ways = tree ? 1U << *rc::gen::inRange(1U, 5U) : *rc::gen::inRange(1U, 20U);
-  const std::uint32_t sets = *rc::gen::inRange(1U, 33U);
+  // Of many ways the order of use is kept otherwise.
+  const bool many = !tree && *rc::gen::inRange(0U, 3U) == 0;
+  const std::uint32_t ways = tree   ? 1U << *rc::gen::inRange(1U, 5U)
+                             : many ? *rc::gen::inRange(33U, 40U)
+                                    : *rc::gen::inRange(1U, 20U);
+  const std::uint32_t sets = *rc::gen::inRange(1U, many ? 4U : 33U);
   made.bytes = std::uint64_t{ways} * sets * made.line_bytes;
   made.ways = sets == 1 && *rc::gen::arbitrary<bool>() ? 0 : ways;
   made.random_seed = *rc::gen::arbitrary<std::uint32_t>();

@@ -82,14 +82,14 @@ class SectoredCache {
     if (links.pins++ != 0) return;
     Set& set = sets_[links.set];
     ++set.pinned;
-    if (replacement_ == Replacement::lru) unlink(set, line);
+    if (order_ == Order::list) unlink(set, line);
   }
   void unpin(Line line) {
     Links& links = links_[line];
     if (--links.pins != 0) return;
     Set& set = sets_[links.set];
     --set.pinned;
-    if (replacement_ == Replacement::lru) return make_newest(set, line);
+    if (order_ == Order::list) return make_newest(set, line);
     use(line);
   }
 
@@ -225,15 +225,26 @@ class SectoredCache {
     std::uint32_t dirty = 0;
     Line next = no_line;  ///< of the chain
   };
+  /// How it is known which line of a set goes. lru: of many ways by a list, of few by when each was used last, so that a use
+  /// touches no other line's place. fifo: by a list.
+  enum class Order : std::uint8_t { last_use, list, arrivals, tree, random };
+  static constexpr std::uint32_t most_ways_without_list = 32;
+  static Order order_of(const CacheOrganization& organization);
   /// Where it stands in its set.
   struct Links {
     Line newer = no_line;
     Line older = no_line;
     std::uint32_t set = 0;
     std::uint32_t pins = 0;
+    /// last_use has in place of neighbours: the how manieth use of any line was its last.
+    std::uint64_t used() const { return std::uint64_t{older} << 32U | newer; }
+    void set_used(std::uint64_t use) {
+      newer = static_cast<Line>(use);
+      older = static_cast<Line>(use >> 32U);
+    }
   };
   struct Set {
-    Line newest = no_line;  ///< lru: of the lines that are not pinned, by use; fifo: of all, by allocation
+    Line newest = no_line;  ///< list: of the lines that are not pinned, by use; arrivals: of all
     Line oldest = no_line;
     std::uint32_t pinned = 0;
     std::uint32_t held = 0;
@@ -267,12 +278,16 @@ class SectoredCache {
   std::uint32_t way_of(Line line) const { return line / static_cast<Line>(sets_.size()); }
   /// A line that is not pinned, or no longer.
   void use(Line line) {
+    if (order_ == Order::last_use) {
+      links_[line].set_used(++uses_);
+      return;
+    }
     Set& set = sets_[links_[line].set];
-    if (replacement_ == Replacement::lru) {
+    if (order_ == Order::list) {
       if (line == set.newest || links_[line].pins != 0) return;
       unlink(set, line);
       make_newest(set, line);
-    } else if (replacement_ == Replacement::tree_plru) {
+    } else if (order_ == Order::tree) {
       point_away(set, line);
     }
   }
@@ -291,6 +306,9 @@ class SectoredCache {
   void point_away(Set& set, Line line);
   Line free_line(std::uint32_t set);
   Line victim(std::uint32_t set);
+  /// Of those that can go the one that was used last longest ago, or `no_line`.
+  template <class CanGo>
+  Line longest_unused(std::uint32_t set, CanGo&& can_go) const;
   Line victim_not_kept(std::uint32_t set) const;
   template <class CanGo>
   Line victim_of_tree(std::uint32_t set, CanGo&& can_go) const;
@@ -329,7 +347,7 @@ class SectoredCache {
   void find_conflicts(std::uint32_t missed_by_shadow);
 
   CacheOrganization organization_;
-  Replacement replacement_;
+  Order order_;
   std::uint32_t ways_;
   unsigned line_shift_;    ///< log2 of the bytes of a line
   unsigned sector_shift_;  ///< log2 of the bytes of a sector
@@ -347,6 +365,7 @@ class SectoredCache {
   std::uint32_t missed_sectors_ = 0;  ///< of the access under way, where conflicts are told
   std::uint32_t first_time_ = 0;      ///< of these, compulsory
   std::uint64_t evictions_ = 0;       ///< so far, for random replacement
+  std::uint64_t uses_ = 0;            ///< so far, by last_use
   std::uint32_t held_ = 0;
   std::uint32_t filling_ = 0;  ///< sectors
   std::vector<Entry> lines_;   ///< of each set that in way 0, in way 1, ...: those of a tile stand beside one another
