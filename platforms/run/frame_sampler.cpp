@@ -21,6 +21,11 @@ constexpr double quads_of_step = 2048;
 constexpr double measured_quads = 20000;  ///< of a window
 constexpr std::uint64_t fewest_windows = 16;
 
+/// What may grow in windows, beyond what chance makes of it. Of the delay 4 % are usual with early termination, and cycles were off,
+/// by half of it, where it was 9 or more; of the lead 12 % with QM, and where it mattered it was hundreds.
+constexpr double most_delay_percent = 2;
+constexpr double most_lead_percent = 25;
+
 /// Of windows, as measured (docs/accuracy.md). Between quads that terminate, queues between RASTER and CROP take long to be as full
 /// as they are in the whole frame.
 struct WindowFacts {
@@ -111,8 +116,8 @@ std::uint64_t FrameSampler::more_windows(const RunRequest& request, std::uint64_
   return static_cast<std::uint64_t>(std::ceil(static_cast<double>(windows) * std::clamp(times, 1.0, 4.0)));
 }
 
-FrameSampler::FrameSampler(const RunRequest& request, const Frame& frame)
-    : request_(request), frame_(frame), warm_up_quads_(facts_of(request).warm_up_quads) {
+FrameSampler::FrameSampler(const RunRequest& request, const Frame& frame, unsigned warm_up_times)
+    : request_(request), frame_(frame), warm_up_quads_(facts_of(request).warm_up_quads * warm_up_times) {
   request_.sampling.reset();
   request_.observers = nullptr;
   request_.reads_statistics = false;
@@ -172,6 +177,7 @@ void FrameSampler::begin(Window& window) {
   const SampledWindow::Range range{is_first ? 0 : warm_up_quads_, measured_quads, &window == &windows_.back()};
   window.from = static_cast<double>(progress_->rasterized()) + range.from;
   window.to = window.from + measured_quads;
+  window.quads = measured_quads;
   window.primitives_from = window.primitives_to = progress_->counts().primitives;
   under_way_ = &window;
   run_ = std::make_unique<SampledWindow>(request_,
@@ -184,6 +190,7 @@ void FrameSampler::end_window() {
   const SampledWindow::Measured measured = run_->result();
   run_.reset();
   under_way_->cycles = measured.cycle_to - measured.cycle_from;
+  under_way_->delay_growth = measured.delay_growth;
   under_way_->primitives_from += measured.primitives_from;
   under_way_->primitives_to += measured.primitives_to;
   measured_ += under_way_->cycles;
@@ -208,6 +215,7 @@ void FrameSampler::find_in_course() {
     const double later = i + 1 == windows_.size() ? from_later : (from_later + to_later) / 2;
     window.from += later;
     window.to += later;
+    window.lead_growth = to_later - from_later;
   }
 }
 
@@ -272,6 +280,20 @@ SampledWork FrameSampler::work_between(double from, double to) const {
   return work;
 }
 
+FrameSampler::Growth FrameSampler::growth_of(double Window::*of_window, double Window::*whole) const {
+  double sum = 0, squares = 0, wholes = 0;
+  const std::size_t between = windows_.size() - 2;
+  for (std::size_t i = 1; i <= between; ++i) {
+    const double growth = windows_[i].*of_window;
+    sum += growth;
+    squares += growth * growth;
+    wholes += windows_[i].*whole;
+  }
+  const auto count = static_cast<double>(between);
+  const double deviation = std::sqrt(std::max(0.0, count * squares - sum * sum) / (count - 1));
+  return {100 * sum / wholes, 100 * deviation / wholes};
+}
+
 std::optional<FrameSampler::Result> FrameSampler::result() const {
   if (!is_whole_) return std::nullopt;
   const Window& head = windows_.front();
@@ -294,6 +316,12 @@ std::optional<FrameSampler::Result> FrameSampler::result() const {
   result.report.windows = windows_.size();
   result.report.measured_share = measured_ / cycles;
   result.report.warm_up_share = warm_up_ / cycles;
+  const Growth delay = growth_of(&Window::delay_growth, &Window::cycles);
+  const Growth lead = growth_of(&Window::lead_growth, &Window::quads);
+  result.report.delay_growth_percent = delay.percent;
+  result.report.lead_growth_percent = lead.percent;
+  result.front_end_is_settled = lead.is_within(most_lead_percent);
+  result.is_settled = result.front_end_is_settled && delay.is_within(most_delay_percent);
   result.report.half_interval_percent = 100 * middle.half_width / cycles + facts_of(request_).bias_percent;
   return result;
 }

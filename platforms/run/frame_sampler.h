@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -36,7 +37,8 @@ class FrameSampler {
 
   /// Both outlive it.
   /// @param request  at fidelity `cycle`, with a sampling
-  FrameSampler(const RunRequest& request, const Frame& frame);
+  /// @param warm_up_times  as long as windows usually warm up
+  FrameSampler(const RunRequest& request, const Frame& frame, unsigned warm_up_times = 1);
   /// Whether windows are less than half of the frame.
   bool is_worth_while() const;
 
@@ -49,6 +51,9 @@ class FrameSampler {
   struct Result {
     std::uint64_t cycles = 0;
     std::uint64_t kernel_events = 0;  ///< of all windows
+    /// Queues do not go on to fill in windows. Where they do, the frame's are fuller than these have been: those behind the
+    /// rasteriser are full after some windows of warming up, those before it hold as much as a frame has.
+    bool is_settled = false, front_end_is_settled = false;
     SamplingReport report;
   };
   /// Then; none if the frame ended before a window did.
@@ -67,6 +72,9 @@ class FrameSampler {
     double from = 0, to = 0;        ///< quads rasterised before it and its end, in the course without time
     std::uint64_t primitives_from = 0, primitives_to = 0;  ///< issued before these
     double cycles = 0;
+    double quads = 0;         ///< rasterised in it
+    double delay_growth = 0;  ///< cycles
+    double lead_growth = 0;   ///< quads of primitives that were issued and not rasterised yet
   };
   void take_step();
   void begin(Window& window);
@@ -76,6 +84,12 @@ class FrameSampler {
   double quads_at_primitive(std::uint64_t primitive) const;
   double quads_at_splat(std::uint32_t splat) const;
   SampledWork work_between(double from, double to) const;
+  /// Of something from the beginnings of windows to their ends, on average, in shares of something that they have.
+  struct Growth {
+    double percent, standard_error;
+    bool is_within(double most) const { return std::fabs(percent) <= most + 2 * standard_error; }
+  };
+  Growth growth_of(double Window::*of_window, double Window::*whole) const;
 
   RunRequest request_;
   const Frame& frame_;

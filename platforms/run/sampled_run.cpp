@@ -45,29 +45,46 @@ RunResult simulate_whole(RunRequest request, const Frame& frame, std::atomic<flo
   return simulate_pipeline(request, frame, progress);
 }
 
+/// By windows that warm up for longer where queues go on to fill in them.
+///
 /// @param request  that can be sampled, as the frame can
-/// Adds to `in_vain` what it took if nothing came of it.
-std::optional<RunResult> simulate_windows(const RunRequest& request, const Frame& frame, FrameSampler& sampler,
-                                          std::atomic<float>* progress, HostTime& in_vain) {
+/// `in_vain` gets what it took if nothing came of it, and `why_not` the reason.
+std::optional<RunResult> simulate_windows(const RunRequest& request, const Frame& frame, std::atomic<float>* progress,
+                                          HostTime& in_vain, std::string& why_not) {
   RunRequest functional = request;
   functional.fidelity = Fidelity::functional;
   functional.sampling.reset();
   functional.effects.with.emplace_back("l2.contents");
-  RunResult result = simulate_pipeline(functional, frame, progress, &sampler);
-  const std::optional<FrameSampler::Result> sampled = sampler.result();
-  if (!sampled) {
+  why_not.clear();
+  for (unsigned warm_up_times = 1;; warm_up_times *= 4) {
+    FrameSampler sampler(request, frame, warm_up_times);
+    if (!sampler.is_worth_while()) {
+      why_not +=
+          why_not.empty() ? "half of the frame would be in windows" : ", and half of the frame would be in longer ones";
+      return std::nullopt;
+    }
+    RunResult result = simulate_pipeline(functional, frame, progress, &sampler);
+    const std::optional<FrameSampler::Result> sampled = sampler.result();
+    if (sampled && sampled->is_settled) {
+      result.request = request;
+      result.sampling = sampled->report;
+      result.sampling->seed = request.sampling->seed;
+      result.cycles = sampled->cycles;
+      result.kernel_events = sampled->kernel_events;
+      result.milliseconds = static_cast<double>(sampled->cycles) / (request.platform->frequency_mhz * 1e3);
+      result.expected_error_percent = sampled->report.half_interval_percent;
+      result.result_hash = hash_of(result);
+      return result;
+    }
     in_vain += result;
-    return std::nullopt;
+    if (!sampled) {
+      why_not = "the frame ended before its windows";
+      return std::nullopt;
+    }
+    why_not = fmt::format("queues went on to fill in windows, for {:.0f} % of their time and {:.0f} % of their quads",
+                          sampled->report.delay_growth_percent, sampled->report.lead_growth_percent);
+    if (!sampled->front_end_is_settled) return std::nullopt;
   }
-  result.request = request;
-  result.sampling = sampled->report;
-  result.sampling->seed = request.sampling->seed;
-  result.cycles = sampled->cycles;
-  result.kernel_events = sampled->kernel_events;
-  result.milliseconds = static_cast<double>(sampled->cycles) / (request.platform->frequency_mhz * 1e3);
-  result.expected_error_percent = sampled->report.half_interval_percent;
-  result.result_hash = hash_of(result);
-  return result;
 }
 
 }  // namespace
@@ -76,16 +93,18 @@ RunResult simulate_sampled(const RunRequest& request, const Frame& frame, std::a
   check_sampling_has_time(request);
   check_may_sample(request);
   if (const auto obstacle = FrameSampler::obstacle(frame)) throw *obstacle;
-  FrameSampler sampler(request, frame);
   HostTime in_vain;
-  if (sampler.is_worth_while()) {
-    if (auto result = simulate_windows(request, frame, sampler, progress, in_vain)) return std::move(*result);
+  std::string why_not;
+  if (auto result = simulate_windows(request, frame, progress, in_vain, why_not)) {
+    in_vain.add_to(*result);
+    return std::move(*result);
   }
   RunResult result = simulate_whole(request, frame, progress);
   in_vain.add_to(result);
   result.request = request;
   result.sampling.emplace();
   result.sampling->seed = request.sampling->seed;
+  result.sampling->whole_because = why_not;
   return result;
 }
 
@@ -152,14 +171,10 @@ class WayWithin {
     // Spread differs between frames: what the first windows say of it counts.
     for (unsigned round = 0; windows && round < 2; ++round) {
       sampled.sampling->windows = *windows;
-      FrameSampler sampler(sampled, frame_);
-      if (!sampler.is_worth_while()) {
-        because_.push_back(fmt::format("the {} windows that takes are half of the frame", *windows));
-        break;
-      }
-      std::optional<RunResult> result = simulate_windows(sampled, frame_, sampler, progress_, in_vain_);
+      std::string why_not;
+      std::optional<RunResult> result = simulate_windows(sampled, frame_, progress_, in_vain_, why_not);
       if (!result) {
-        because_.emplace_back("the frame ended before its windows");
+        because_.push_back(fmt::format("{} windows: {}", *windows, why_not));
         break;
       }
       const double half = result->sampling->half_interval_percent;

@@ -81,6 +81,7 @@ SampledWindow::Measured SampledWindow::measure() {
   const auto end = static_cast<double>(gpu_.run(nullptr));
   measured.kernel_events = gpu_.clock().activations();
   if (range_.from > 0) measured.cycle_from = (in_from.cycle() + out_from.cycle()) / 2;
+  measured.delay_growth = (out_to.cycle() - in_to.cycle()) - (out_from.cycle() - in_from.cycle());
   measured.cycle_to = range_.to_end ? end : (in_to.cycle() + out_to.cycle()) / 2;
   measured.is_whole = out_from.has_been() && (range_.to_end || out_to.has_been());
   return measured;

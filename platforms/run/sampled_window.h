@@ -27,6 +27,8 @@ class SampledWindow {
   struct Measured {
     std::uint64_t primitives_from = 0, primitives_to = 0;  ///< since it began to warm up, as the cycles
     double cycle_from = 0, cycle_to = 0;
+    double delay_growth =
+        0;  ///< cycles that a quad is longer on its way from the rasteriser at the end than at the beginning
     std::uint64_t kernel_events = 0;
     bool is_whole = false;  ///< the frame did not end before it
   };

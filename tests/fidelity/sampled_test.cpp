@@ -129,6 +129,39 @@ TEST(Sampled, SimulatesAllOfWhatItsWindowsWouldCover) {
   EXPECT_EQ(run(sampled(request_of("baseline")), empty).sampling->windows, 0);
 }
 
+RunRequest with_deep_queue() {
+  RunRequest request = on("agx-orin-ideal-memory", request_of("baseline"));
+  request.settings.push_back({"link.prop.color", "depth", "2000"});
+  return request;
+}
+
+TEST(Sampled, WarmsUpForLongerWhereQueuesGoOnToFillInWindows) {
+  const Draw draw = changing_draw(40000, 2);
+  const auto cycles = static_cast<double>(*run(with_deep_queue(), draw).cycles);
+  const RunResult result = run(sampled(with_deep_queue()), draw);
+  ASSERT_EQ(result.sampling->windows, 18);
+  const RunResult usual = run(sampled(on("agx-orin-ideal-memory", request_of("baseline"))), draw);
+  EXPECT_GT(result.sampling->warm_up_share, 3 * usual.sampling->warm_up_share);
+  EXPECT_NEAR(static_cast<double>(*result.cycles) / cycles, 1, result.sampling->half_interval_percent / 100);
+}
+
+TEST(Sampled, SimulatesAllWhereQueuesGoOnToFillAndLongerWindowsWouldBeHalfOfTheFrame) {
+  const RunResult cycle = run(with_deep_queue(), long_draw());
+  const RunResult result = run(sampled(with_deep_queue()), long_draw());
+  EXPECT_EQ(result.sampling->windows, 0);
+  EXPECT_NE(result.sampling->whole_because.find("queues went on to fill"), std::string::npos)
+      << result.sampling->whole_because;
+  EXPECT_EQ(result.result_hash, cycle.result_hash);
+}
+
+TEST(Sampled, SimulatesAllWhereTheFrontEndRunsOnAhead) {
+  RunRequest request = on("agx-orin-ideal-memory", request_of("baseline"));
+  request.settings.push_back({"link.tgc.jobs", "depth", "65536"});
+  const RunResult result = run(sampled(request), changing_draw(40000, 2));
+  EXPECT_EQ(result.sampling->windows, 0) << result.sampling->delay_growth_percent << " "
+                                         << result.sampling->lead_growth_percent;
+}
+
 TEST(Sampled, RefusesWhatItCannotHaveWindowsOf) {
   const Draw draw = random_draw(64, 48, 600, 9);
   const auto refusal = [&](const RunRequest& request) { return refusal_of([&] { run(request, draw); }); };

@@ -6,6 +6,9 @@
 #include <set>
 #include <sstream>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/gaussian_scene.h>
@@ -84,8 +87,8 @@ tools::AccuracyResult large_result() {
       level.run.request.fidelity = fidelity;
       level.run.cycles = 1234567890;
       level.run.kernel_events = 123456789;
-      level.cpu_seconds = 999.99;
-      level.times_as_fast = 12.34;
+      level.host_seconds = level.cpu_seconds = 999.99;
+      level.times_as_fast = level.times_as_fast_elapsed = 12.34;
       level.quads_per_second = 123.4e6;
       level.cycles_error_percent = level.speedup_error_percent = -12.345;
       level.fragments_blended_error_percent = 0.00012;
@@ -172,6 +175,21 @@ TEST(AccuracyText, SaysWhatAccuracyCosts) {
   EXPECT_EQ(tools::precision_verdict(result), "the default: 57.40 dB; cheapest, " + result.runs[1].name +
                                                   ": -12.35 % of the cycles for 42.00 dB; most exact, " +
                                                   result.runs[2].name + ": -12.35 % of the cycles for 101.23 dB");
+}
+
+TEST(AccuracyText, SaysWhatASecondCoreSpares) {
+  tools::AccuracyResult result = large_result();
+  for (tools::FidelityLevel& level : result.fidelity) {
+    if (level.run.request.fidelity != Fidelity::lt) continue;
+    level.host_seconds = 0.6 * level.cpu_seconds;
+    level.times_as_fast_elapsed = level.run.request.variant.name == "baseline" ? 20 : 21.5;
+  }
+  const std::string summary = fmt::format("{}", fmt::join(tools::fidelity_summary(result), "\n"));
+  EXPECT_NE(summary.find(
+                "lt: 12.3 times as fast in CPU seconds, 20.0 to 21.5 times with another core beside it, cycles"),
+            std::string::npos)
+      << summary;
+  EXPECT_NE(summary.find("bound: 12.3 times as fast, cycles"), std::string::npos) << summary;
 }
 
 TEST(PrecisionKnobs, AreAllThatTheHardwareChooses) {
@@ -662,7 +680,8 @@ TEST_F(Accuracy, ResultsDoNotDependOnTheNumberOfProcesses) {
     results[i] = accuracy({"--jobs", jobs[i]});
     for (const char* ladder : {"fidelity", "precision"}) {
       for (json& row : results[i][ladder]) {
-        for (const char* key : {"host_seconds", "cpu_seconds", "times_as_fast", "quads_per_second", "dominated"}) {
+        for (const char* key : {"host_seconds", "cpu_seconds", "times_as_fast", "times_as_fast_elapsed",
+                                "quads_per_second", "dominated"}) {
           row.erase(key);
         }
       }

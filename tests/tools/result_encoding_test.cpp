@@ -68,7 +68,7 @@ RunResult full_result() {
   result.parameters = {{"tc.bins", "32"}, {"state.exponential", "exact"}};
   result.outside_validated_range = {"\xc3", ""};
   result.expected_error_percent = 0.1 + 0.2;
-  result.sampling = SamplingReport{26, huge - 4, 0.1, 0.2, 1.0 / 3};
+  result.sampling = SamplingReport{26, huge - 4, 0.1, 0.2, 1.0 / 3, 1.0 / 7, 1.0 / 9, "queues"};
   result.way = WayReport{"sampled", "\xe9"};
   result.result_hash = "0123456789abcdef";
   result.kernel_events = 9;
@@ -154,12 +154,16 @@ void expect_equal(const RunResult& actual, const RunResult& expected) {
                intervals] = actual;
   ASSERT_EQ(sampling.has_value(), expected.sampling.has_value());
   if (sampling) {
-    const auto& [windows, seed, measured_share, warm_up_share, half_interval_percent] = *sampling;
+    const auto& [windows, seed, measured_share, warm_up_share, half_interval_percent, delay_growth_percent,
+                 lead_growth_percent, whole_because] = *sampling;
     EXPECT_EQ(windows, expected.sampling->windows);
     EXPECT_EQ(seed, expected.sampling->seed);
     EXPECT_EQ(measured_share, expected.sampling->measured_share);
     EXPECT_EQ(warm_up_share, expected.sampling->warm_up_share);
     EXPECT_EQ(half_interval_percent, expected.sampling->half_interval_percent);
+    EXPECT_EQ(delay_growth_percent, expected.sampling->delay_growth_percent);
+    EXPECT_EQ(lead_growth_percent, expected.sampling->lead_growth_percent);
+    EXPECT_EQ(whole_because, expected.sampling->whole_because);
   }
   ASSERT_EQ(way.has_value(), expected.way.has_value());
   if (way) {

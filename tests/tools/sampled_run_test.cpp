@@ -40,7 +40,7 @@ TEST_F(SampledRun, SaysWhatItsWindowsAre) {
 
 TEST_F(SampledRun, SaysThatAllOfAShortFrameIsSimulated) {
   const Finished finished = vrpipe({"run", "--scene", "tiny.spl", "--fidelity", "sampled"});
-  EXPECT_TRUE(has(finished.out, "sampled: all of the frame at cycle, since windows would be half of it\n"));
+  EXPECT_TRUE(has(finished.out, "sampled: all of the frame at cycle: half of the frame would be in windows\n"));
   const json run = json_of({"run", "--scene", "tiny.spl", "--fidelity", "sampled"})["runs"][0];
   EXPECT_EQ(run["cycles"], json_of({"run", "--scene", "tiny.spl"})["runs"][0]["cycles"]);
   EXPECT_EQ(run["sampling"]["windows"], 0);

@@ -224,6 +224,7 @@ void compare_rungs(FidelityLevel* levels, std::size_t count) {
     level->cycles_error_percent = error_percent(cycles_of(level->run), cycles_of(exact.run));
     level->speedup_error_percent = error_percent(level->speedup, exact.speedup);
     if (level->cpu_seconds > 0) level->times_as_fast = exact.cpu_seconds / level->cpu_seconds;
+    if (level->host_seconds > 0) level->times_as_fast_elapsed = exact.host_seconds / level->host_seconds;
     if (!level->run.cycles) continue;
     timed.push_back(level);
     trade_offs.push_back({level->cpu_seconds, std::fabs(level->cycles_error_percent.value_or(0))});

@@ -40,6 +40,7 @@ struct FidelityLevel {
   double host_seconds = 0;                     ///< the median
   double cpu_seconds = 0;                      ///< the median
   double times_as_fast = 0;                    ///< in CPU seconds, as the most exact fidelity of the variant
+  double times_as_fast_elapsed = 0;            ///< in host seconds
   std::optional<double> cycles_error_percent;  ///< above 0: too many cycles; none without time
   std::optional<double> speedup;               ///< over the baseline at the same fidelity
   std::optional<double> speedup_error_percent;

@@ -64,7 +64,8 @@ VRPIPE_MEMBERS(UnitIntervals, name, cycles)
 VRPIPE_MEMBERS(StatisticIntervals, name, kind, values, denominators)
 VRPIPE_MEMBERS(IntervalReport, every, from, units, statistics)
 VRPIPE_MEMBERS(WayReport, fidelity, why)
-VRPIPE_MEMBERS(SamplingReport, windows, seed, measured_share, warm_up_share, half_interval_percent)
+VRPIPE_MEMBERS(SamplingReport, windows, seed, measured_share, warm_up_share, half_interval_percent,
+               delay_growth_percent, lead_growth_percent, whole_because)
 VRPIPE_MEMBERS(RunResult, request, cycles, stopped, milliseconds, host_seconds, cpu_seconds, counts, utilization, units,
                bottleneck, kernels, statistics, implementations, parameters, outside_validated_range,
                expected_error_percent, effects, sampling, way, result_hash, kernel_events, framebuffer, draws,

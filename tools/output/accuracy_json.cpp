@@ -28,6 +28,7 @@ Json fidelity_json(const FidelityLevel& level) {
           {"host_seconds", level.host_seconds},
           {"cpu_seconds", level.cpu_seconds},
           {"times_as_fast", level.times_as_fast},
+          {"times_as_fast_elapsed", level.times_as_fast_elapsed},
           {"quads_per_second", level.quads_per_second},
           {"kernel_events", level.run.kernel_events},
           {"dominated", level.dominated},

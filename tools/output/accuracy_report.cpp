@@ -146,7 +146,15 @@ struct FidelityRange {
   bool is_there = false, is_reference = true;
   bool timed = false;
   bool always_dominated = true;
-  double slowest = INFINITY, fastest = 0;          // times as fast as the most exact
+  struct Times {
+    double slowest = INFINITY, fastest = 0;
+    void add(double times) {
+      slowest = std::min(slowest, times);
+      fastest = std::max(fastest, times);
+    }
+  };
+  Times times, times_elapsed;                      // as fast as the most exact
+  bool on_several_cores = false;                   // in some variant
   double cycles_percent = 0, speedup_percent = 0;  // the largest errors
   double quads_per_second = INFINITY;              // the least
   double worst_image_db = INFINITY;
@@ -175,8 +183,9 @@ FidelityRange range_of(const AccuracyResult& result, const std::string& fidelity
     if (fidelity_of(level.run.request) != fidelity || (is_finest(level.run.request) && !range.is_reference)) continue;
     range.timed = level.run.cycles.has_value();
     range.always_dominated &= level.dominated;
-    range.slowest = std::min(range.slowest, level.times_as_fast);
-    range.fastest = std::max(range.fastest, level.times_as_fast);
+    range.times.add(level.times_as_fast);
+    range.times_elapsed.add(level.times_as_fast_elapsed);
+    range.on_several_cores |= level.host_seconds < 0.95 * level.cpu_seconds;
     range.cycles_percent = std::max(range.cycles_percent, std::fabs(level.cycles_error_percent.value_or(0)));
     range.speedup_percent = std::max(range.speedup_percent, std::fabs(level.speedup_error_percent.value_or(0)));
     if (level.run.request.variant.is_of_pipeline())
@@ -195,9 +204,9 @@ std::string price_text(const RunResult& run) {
   return text;
 }
 
-std::string times_text(const FidelityRange& range) {
-  const std::string slowest = fmt::format("{:.1f}", range.slowest);
-  const std::string fastest = fmt::format("{:.1f}", range.fastest);
+std::string times_text(const FidelityRange::Times& times) {
+  const std::string slowest = fmt::format("{:.1f}", times.slowest);
+  const std::string fastest = fmt::format("{:.1f}", times.fastest);
   return slowest == fastest ? slowest + " times" : slowest + " to " + fastest + " times";
 }
 
@@ -378,9 +387,9 @@ std::string fidelity_verdict(const AccuracyResult& result) {
     const FidelityRange range = range_of(result, *level);
     if (range.is_reference) continue;
     const bool first = text.empty();
-    text +=
-        fmt::format("{}{}: {}{}, {}", first ? "" : "; ", *level, times_text(range), first ? " as fast as " + exact : "",
-                    range.timed ? "cycles within " + within(range.cycles_percent) : "without cycles");
+    text += fmt::format("{}{}: {}{}, {}", first ? "" : "; ", *level, times_text(range.times),
+                        first ? " as fast as " + exact : "",
+                        range.timed ? "cycles within " + within(range.cycles_percent) : "without cycles");
   }
   return text;
 }
@@ -408,7 +417,9 @@ std::vector<std::string> fidelity_summary(const AccuracyResult& result) {
     if (range.is_reference) {
       line += "what the others are measured against";
     } else {
-      line += times_text(range) + " as fast";
+      line += times_text(range.times) + " as fast";
+      if (range.on_several_cores)
+        line += fmt::format(" in CPU seconds, {} with another core beside it", times_text(range.times_elapsed));
       line += range.timed ? fmt::format(", cycles within {}, speed-ups within {}", within(range.cycles_percent),
                                         within(range.speedup_percent))
                           : ", no cycles";

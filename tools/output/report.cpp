@@ -401,7 +401,7 @@ std::string sampling_text(const std::vector<RunResult>& runs) {
     if (!run.sampling) continue;
     const SamplingReport& sampling = *run.sampling;
     if (sampling.windows == 0) {
-      text += fmt::format("{}sampled: all of the frame at cycle, since windows would be half of it\n", name);
+      text += fmt::format("{}sampled: all of the frame at cycle: {}\n", name, sampling.whole_because);
       continue;
     }
     text += fmt::format(

@@ -225,6 +225,9 @@ Json sampling_json(const SamplingReport& sampling) {
           {"measured_share", sampling.measured_share},
           {"warm_up_share", sampling.warm_up_share},
           {"half_interval_percent", sampling.half_interval_percent},
+          {"delay_growth_percent", sampling.delay_growth_percent},
+          {"lead_growth_percent", sampling.lead_growth_percent},
+          {"whole_because", sampling.windows == 0 ? Json(sampling.whole_because) : Json()},
           {"confidence_percent", SamplingReport::confidence_percent}};
 }
 

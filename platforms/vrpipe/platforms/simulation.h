@@ -280,6 +280,11 @@ struct SamplingReport {
   double warm_up_share = 0;   ///< those before them, until each was as the whole frame is there, in the same unit
   /// The cycles of `cycle` are so near in `confidence_percent` frames and seeds of 100.
   double half_interval_percent = 0;
+  /// How much longer quads are on their way from the rasteriser to the end at the end of a window than at its beginning, in percent
+  /// of its time, and how much farther the front end is ahead of the rasteriser, in percent of its quads: much, where queues go on
+  /// to fill. Then windows warm up for longer, or all is simulated.
+  double delay_growth_percent = 0, lead_growth_percent = 0;
+  std::string whole_because;  ///< all was simulated
   static constexpr double confidence_percent = 95;
 };
 
