@@ -103,8 +103,9 @@ std::optional<std::uint64_t> FrameSampler::windows_for(const RunRequest& request
   const WindowFacts& facts = facts_of(request);
   if (error_percent <= facts.bias_percent) return std::nullopt;
   const double root = facts.spread_percent / (error_percent - facts.bias_percent);
-  // More than there are in any frame are as good as all of these.
-  return std::max(fewest_windows, static_cast<std::uint64_t>(std::min(std::ceil(root * root), 1e6)));
+  // Half as many more, since another pass over the frame takes longer than these. More than there are in any frame are as good as
+  // all of them.
+  return std::max(fewest_windows, static_cast<std::uint64_t>(std::min(std::ceil(1.5 * root * root), 1e6)));
 }
 
 std::uint64_t FrameSampler::more_windows(const RunRequest& request, std::uint64_t windows, double half_interval_percent,
@@ -145,8 +146,9 @@ FrameSampler::FrameSampler(const RunRequest& request, const Frame& frame, unsign
   windows_.push_back({splat_at(end - warm_up_quads_), frame.splats()});
 }
 
-bool FrameSampler::is_worth_while() const {
-  return static_cast<double>(windows_.size()) * (measured_quads + warm_up_quads_) < estimated_quads_ / 2;
+double FrameSampler::share() const {
+  const double quads = static_cast<double>(windows_.size()) * (measured_quads + warm_up_quads_);
+  return quads / std::max(estimated_quads_, 1.0);
 }
 
 void FrameSampler::begin(const UntimedGpu& gpu, const Framebuffer& framebuffer) {

@@ -39,8 +39,10 @@ class FrameSampler {
   /// @param request  at fidelity `cycle`, with a sampling
   /// @param warm_up_times  as long as windows usually warm up
   FrameSampler(const RunRequest& request, const Frame& frame, unsigned warm_up_times = 1);
-  /// Whether windows are less than half of the frame.
-  bool is_worth_while() const;
+  /// Of the frame, about, that is in windows or warms them up.
+  double share() const;
+  /// Whether that is less than half of it.
+  bool is_worth_while() const { return share() < 0.5; }
 
   /// Before the run of a GPU without time, which outlives this.
   void begin(const UntimedGpu& gpu, const Framebuffer& framebuffer);

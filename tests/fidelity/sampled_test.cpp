@@ -218,6 +218,14 @@ TEST(WithinAnError, TakesWindowsWhereLtDoesNotKnow) {
   EXPECT_LE(result.sampling->half_interval_percent, 4);
 }
 
+TEST(WithinAnError, TakesWindowsAtOnceWhereTheyAreCheaperThanLt) {
+  RunRequest request = request_of("baseline");
+  request.error_percent = 4;
+  const RunResult result = run(request, changing_draw(40000, 2));
+  EXPECT_EQ(result.way->fidelity, "sampled");
+  EXPECT_EQ(result.way->why.find("lt"), std::string::npos) << result.way->why;
+}
+
 TEST(WithinAnError, TakesCycleWhereNothingElseIsAsNear) {
   const Draw draw = random_draw(64, 48, 600, 9);
   for (const double percent : {0.05, 0.5}) {
