@@ -36,9 +36,7 @@ struct SectoredCache::Shadow {
 };
 
 SectoredCache::SectoredCache(const CacheOrganization& organization, SectoredCacheStatistics& statistics)
-    : organization_(organization),
-      statistics_(&statistics),
-      details_(statistics.has_details()) {
+    : organization_(organization), statistics_(&statistics), details_(statistics.has_details()) {
   organization.check("cache", "cache", "bytes");
   order_ = order_of(organization);
   ways_ = organization.ways_of_a_set();

@@ -39,9 +39,6 @@ std::uint64_t retired(const Counts& counts) {
 
 }  // namespace
 
-SampledWindow::SimulationOfItsOwn::SimulationOfItsOwn() { fresh_simulation(); }
-SampledWindow::SimulationOfItsOwn::~SimulationOfItsOwn() { fresh_simulation(); }
-
 SampledWindow::SampledWindow(const RunRequest& request, const Frame& part, Range range, const UntimedGpu& before,
                              Framebuffer& drawn)
     : range_(range),

@@ -27,8 +27,7 @@ class SampledWindow {
   struct Measured {
     std::uint64_t primitives_from = 0, primitives_to = 0;  ///< since it began to warm up, as the cycles
     double cycle_from = 0, cycle_to = 0;
-    double delay_growth =
-        0;  ///< cycles that a quad is longer on its way from the rasteriser at the end than at the beginning
+    double delay_growth = 0;  ///< cycles that its last quads take longer to the end than its first
     std::uint64_t kernel_events = 0;
     bool is_whole = false;  ///< the frame did not end before it
   };
@@ -47,12 +46,11 @@ class SampledWindow {
 
  private:
   Measured measure();
-  class SimulationOfItsOwn {
-   public:
-    SimulationOfItsOwn();
-    ~SimulationOfItsOwn();
+  struct FreshSimulation {
+    FreshSimulation() { fresh_simulation(); }
+    ~FreshSimulation() { fresh_simulation(); }
   };
-  const SimulationOfItsOwn simulation_;
+  const FreshSimulation around_;
   const Range range_;
   const Configuration configuration_;
   Gpu gpu_;

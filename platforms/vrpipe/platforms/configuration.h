@@ -168,7 +168,7 @@ class Configuration {
   StateParameters state_parameters_;
   std::vector<RenderContext> contexts_;  ///< by GPC
   std::shared_ptr<const FrameFacts> facts_;
-  std::vector<EffectReport> effects_;    ///< before the run
+  std::vector<EffectReport> effects_;  ///< before the run
 };
 
 /// The default implementation of a slot; what stands in where the variant does without the unit.
