@@ -148,9 +148,9 @@ struct FidelityRange {
   bool always_dominated = true;
   struct Times {
     double slowest = INFINITY, fastest = 0;
-    void add(double times) {
-      slowest = std::min(slowest, times);
-      fastest = std::max(fastest, times);
+    void add(double factor) {
+      slowest = std::min(slowest, factor);
+      fastest = std::max(fastest, factor);
     }
   };
   Times times, times_elapsed;                      // as fast as the most exact
