@@ -16,9 +16,7 @@ void for_each_sector(const MemoryRequest& request, Function&& function) {
   for (std::uint64_t sector = request.address / fill_bytes; sector <= last; ++sector) function(sector);
 }
 
-bool writes_whole_sectors(const MemoryRequest& request) {
-  return request.command == tlm::TLM_WRITE_COMMAND && request.bytes >= fill_bytes;
-}
+bool writes_whole_sectors(const MemoryRequest& request) { return is_write(request) && request.bytes >= fill_bytes; }
 
 MemoryRequest read_of(std::uint64_t sector, const MemoryOrigin& origin) {
   return {sector * fill_bytes, fill_bytes, tlm::TLM_READ_COMMAND, origin};

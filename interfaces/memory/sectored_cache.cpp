@@ -111,7 +111,7 @@ SectoredCache::Line SectoredCache::allocate(std::uint64_t address, Evicted& evic
     const std::size_t words = mask_words(organization_);
     std::fill_n(byte_masks_.begin() + static_cast<std::ptrdiff_t>(line * words), words, 0);
   }
-  if (order_ == Order::list || order_ == Order::arrivals) {
+  if (is_listed()) {
     make_newest(set, line);
   } else {
     use(line);
@@ -137,31 +137,25 @@ SectoredCache::Order SectoredCache::order_of(const CacheOrganization& organizati
 
 SectoredCache::Line SectoredCache::victim(std::uint32_t set) {
   const auto can_go = [&](Line line) { return links_[line].pins == 0; };
-  switch (order_) {
-    case Order::last_use: return longest_unused(set, can_go);
-    case Order::list: break;
-    case Order::arrivals: {
-      Line line = sets_[set].oldest;
-      while (!can_go(line)) line = links_[line].newer;
-      return line;
-    }
-    case Order::random: {
-      std::uint64_t before = mix(organization_.random_seed + evictions_) % (ways_ - sets_[set].pinned);
-      if (sets_[set].pinned == 0) return line_of(set, static_cast<std::uint32_t>(before));
-      for (std::uint32_t way = 0;; ++way) {
-        if (can_go(line_of(set, way)) && before-- == 0) return line_of(set, way);
-      }
-    }
-    case Order::tree: {
-      const bool all_can = sets_[set].pinned == 0;
-      return victim_of_tree(set, [&](Line line) { return all_can || can_go(line); });
-    }
+  if (order_ == Order::tree) {
+    const bool all_can = sets_[set].pinned == 0;
+    return victim_of_tree(set, [&](Line line) { return all_can || can_go(line); });
   }
-  return sets_[set].oldest;
+  if (order_ != Order::random) return first_in_order(set, can_go);
+  std::uint64_t before = mix(organization_.random_seed + evictions_) % (ways_ - sets_[set].pinned);
+  if (sets_[set].pinned == 0) return line_of(set, static_cast<std::uint32_t>(before));
+  for (std::uint32_t way = 0;; ++way) {
+    if (can_go(line_of(set, way)) && before-- == 0) return line_of(set, way);
+  }
 }
 
 template <class CanGo>
-SectoredCache::Line SectoredCache::longest_unused(std::uint32_t set, CanGo&& can_go) const {
+SectoredCache::Line SectoredCache::first_in_order(std::uint32_t set, CanGo&& can_go) const {
+  if (is_listed()) {
+    Line line = sets_[set].oldest;
+    while (line != no_line && !can_go(line)) line = links_[line].newer;
+    return line;
+  }
   Line oldest = no_line;
   for (std::uint32_t way = 0; way < ways_; ++way) {
     const Line line = line_of(set, way);
@@ -199,12 +193,7 @@ SectoredCache::Line SectoredCache::victim_of_tree(std::uint32_t set, CanGo&& can
 
 SectoredCache::Line SectoredCache::victim_not_kept(std::uint32_t set) const {
   const auto can_go = [&](Line line) { return links_[line].pins == 0 && !kept_[line]; };
-  if (order_ == Order::last_use) return longest_unused(set, can_go);
-  if (order_ == Order::list || order_ == Order::arrivals) {
-    Line line = sets_[set].oldest;
-    while (line != no_line && !can_go(line)) line = links_[line].newer;
-    return line;
-  }
+  if (order_ != Order::tree && order_ != Order::random) return first_in_order(set, can_go);
   std::uint32_t others = 0;
   for (std::uint32_t way = 0; way < ways_; ++way) others += can_go(line_of(set, way)) ? 1U : 0U;
   if (others == 0) return no_line;
@@ -229,7 +218,7 @@ void SectoredCache::take_out(Line line) {
     kept_[line] = false;
     --set.kept;
   }
-  if (order_ == Order::list || order_ == Order::arrivals) unlink(set, line);
+  if (is_listed()) unlink(set, line);
   Line* at = &chains_[chain_of(entry.tag)];
   while (*at != line) at = &lines_[*at].next;
   *at = entry.next;

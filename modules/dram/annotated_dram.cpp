@@ -56,7 +56,7 @@ tlm::tlm_base_target_socket_b<32>& AnnotatedDram::port(unsigned index) { return 
 
 Cycle AnnotatedDram::serve(const MemoryRequest& request, Cycle arrival) {
   behaviour_.count(request);
-  const bool writes = request.command == tlm::TLM_WRITE_COMMAND;
+  const bool writes = is_write(request);
   const Cycle now = clock_.edge_of(arrival + 1);
   const Cycle present = clock_.edge_of(domain_.now());
   Cycle done = 0;

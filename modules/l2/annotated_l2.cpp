@@ -28,16 +28,10 @@ class AnnotatedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
     l2_.behaviour_->count(request);
     const Cycle now = l2_.now();
     arrival = l2_.crossing_.edge_of(arrival);
-    const std::uint64_t at = l2.looked_up_at(request);
     Cycle complete = 0;
-    if (at == request.address && l2.is_in_one_line(request)) {
-      complete = serve_in_line(request, arrival, now);  // a copy would wait for the stores that have just made it
-    } else {
-      l2.for_each_line(at, request.bytes, [&](std::uint64_t address, std::uint32_t bytes) {
-        const MemoryRequest part{address, bytes, request.command, request.origin};
-        complete = std::max(complete, serve_in_line(part, arrival, now));
-      });
-    }
+    l2.for_each_part(request, [&](const MemoryRequest& part) {
+      complete = std::max(complete, serve_in_line(part, arrival, now));
+    });
     return l2_.crossing_.cycle_of(l2_.sizes_.latency_cycles + complete);
   }
   Cycle serve_in_line(const MemoryRequest& request, Cycle arrival, Cycle now) {
@@ -173,17 +167,10 @@ AnnotatedL2::Wait AnnotatedL2::fetch(const MemoryRequest& access, const LineAcce
 }
 
 AnnotatedL2::Served AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival) {
-  const bool writes = access.command == tlm::TLM_WRITE_COMMAND;
   const std::uint32_t cycles = behaviour_->bank_cycles(access.bytes);
   std::uint32_t sectors = 0;
-  const SectoredCache::Line line = cache_.hit(access.address, access.bytes, writes, sectors);
-  if (line == SectoredCache::no_line) {
-    const LineAccess done = cache_.access(access.address, access.bytes, writes);
-    behaviour_->looked_up(access, static_cast<unsigned>(__builtin_popcount(done.sectors)),
-                          static_cast<unsigned>(__builtin_popcount(done.missed)));
-    return wait(access, done, arrival, cycles);
-  }
-  behaviour_->looked_up(access, static_cast<unsigned>(__builtin_popcount(sectors)), 0);
+  const SectoredCache::Line line = behaviour_->hit(access, sectors);
+  if (line == SectoredCache::no_line) return wait(access, behaviour_->look_up(access), arrival, cycles);
   if (cache_.note(line) > arrival) {
     LineAccess hit;
     hit.line = line;

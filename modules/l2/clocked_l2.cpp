@@ -211,7 +211,7 @@ void ClockedL2::finish_fills(Cycle now, Cycle after) {
   while (memory_.next_completion() < after && memory_.next_completed(tag)) {
     const Below done = asked_[tag];
     free_tags_.push_back(tag);
-    if (done.access.command == tlm::TLM_WRITE_COMMAND) {
+    if (is_write(done.access)) {
       if (done.request != nobody) respond(done.request, now, now);
       continue;
     }
@@ -241,7 +241,7 @@ void ClockedL2::finish_fills(Cycle now, Cycle after) {
 [[gnu::always_inline]] inline void ClockedL2::hit(std::uint32_t index, std::uint32_t request, SectoredCache::Line line,
                                                   std::uint32_t sectors, Cycle now) {
   const MemoryRequest& access = requests_[request].access;
-  const bool writes = access.command == tlm::TLM_WRITE_COMMAND;
+  const bool writes = is_write(access);
   cache_.touch(line);
   if (writes) cache_.make_dirty(line, sectors);
   cache_.looked_up(line, behaviour_->first_of(access), access.bytes, writes);
@@ -334,7 +334,7 @@ void ClockedL2::pass(std::uint32_t index, std::uint32_t request, Cycle now) {
 void ClockedL2::look_up(std::uint32_t index, std::uint32_t request, SectoredCache::Line line, Cycle now) {
   Bank& bank = banks_[index];
   const MemoryRequest access = requests_[request].access;
-  const bool writes = access.command == tlm::TLM_WRITE_COMMAND;
+  const bool writes = is_write(access);
   const std::uint32_t first = behaviour_->first_of(access);
   const std::uint64_t line_address = access.address - first;
   const std::uint32_t sectors = behaviour_->sectors_of(access);
@@ -395,7 +395,7 @@ Cycle ClockedL2::ask_below() {
     const Below below = from.front();
     from.pop();
     asked_[tag] = below;
-    if (below.access.command == tlm::TLM_WRITE_COMMAND) {
+    if (is_write(below.access)) {
       Bank& bank = banks_[below.bank];
       --bank.write_backs;
       bank.stuck = false;

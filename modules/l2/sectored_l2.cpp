@@ -103,43 +103,30 @@ SectoredL2::SectoredL2(const SectoredL2Parameters& parameters, const RenderConte
 
 void SectoredL2::access(const MemoryRequest& request) {
   traffic_.count(request);
-  const std::uint64_t at = looked_up_at(request);
   const bool certain = counts_least_ && is_certain(request);
-  if (at == request.address && is_in_one_line(request) && !passes(request)) {
-    std::uint32_t sectors = 0;
-    const SectoredCache::Line line = cache_.hit(at, request.bytes, is_write(request), sectors);
-    if (line != SectoredCache::no_line) {
-      looked_up(request, static_cast<unsigned>(__builtin_popcount(sectors)), 0);
-      if (certain) count_bank(bank_of_line(line), request.bytes);
-      return;
-    }
-  }
-  for_each_line(at, request.bytes, [&](std::uint64_t address, std::uint32_t bytes) {
-    access_line({address, bytes, request.command, request.origin, certain});
-  });
+  for_each_part(request, [&](const MemoryRequest& part) { access_part(part, certain); });
 }
 
-void SectoredL2::access_line(const MemoryRequest& part) {
+void SectoredL2::access_part(const MemoryRequest& part, bool certain) {
   if (passes(part)) {
-    if (below_ != nullptr) below_->access(below_as(part));
-    if (part.is_certain) count_bank(bank_of(part.address), part.bytes);
+    access_below(below_as(part), certain);
+    if (certain) count_bank(bank_of(part.address), part.bytes);
     return;
   }
-  const LineAccess done = cache_.access(part.address, part.bytes, is_write(part));
-  looked_up(part, static_cast<unsigned>(__builtin_popcount(done.sectors)),
-            static_cast<unsigned>(__builtin_popcount(done.missed)));
+  std::uint32_t sectors = 0;
+  if (const SectoredCache::Line line = hit(part, sectors); line != SectoredCache::no_line) {
+    if (certain) count_bank(bank_of_line(line), part.bytes);
+    return;
+  }
+  const LineAccess done = look_up(part);
   // What goes, and is missed once more, is so because of what came between.
-  const bool is_first = part.is_certain && done.filled == done.filled_first;
-  const auto below = [&](bool moved_always) {
-    return [this, moved_always](MemoryRequest moved, const SectorRun&) {
-      moved.is_certain = moved_always;
-      if (below_ != nullptr) below_->access(moved);
-    };
-  };
-  for_each_run(done.old_address, done.written_back, tlm::TLM_WRITE_COMMAND, origins_[done.line], below(false));
+  const bool is_first = certain && done.filled == done.filled_first;
+  for_each_run(done.old_address, done.written_back, tlm::TLM_WRITE_COMMAND, origins_[done.line],
+               [&](const MemoryRequest& moved, const SectorRun&) { access_below(moved, false); });
   if (done.replaced) allocated(done.line, part.origin, done.spared);
-  for_each_run(done.address, done.filled, tlm::TLM_READ_COMMAND, part.origin, below(is_first));
-  if (!part.is_certain) return;
+  for_each_run(done.address, done.filled, tlm::TLM_READ_COMMAND, part.origin,
+               [&](const MemoryRequest& moved, const SectorRun&) { access_below(moved, is_first); });
+  if (!certain) return;
   const auto filled = is_first ? static_cast<unsigned>(__builtin_popcount(done.filled)) : 0U;
   count_bank(bank_of(part.address), part.bytes + std::uint64_t{filled} * cache_.organization().sector_bytes);
 }

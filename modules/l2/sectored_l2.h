@@ -163,6 +163,18 @@ class SectoredL2 final : public MemoryBehaviour {
   SectoredCacheStatistics& statistics() { return statistics_; }
   /// At a port.
   void count(const MemoryRequest& request) { traffic_.count(request); }
+  /// All at once for a part, if it hits: `sectors` gets those needed. Returns the line, or `no_line`; then `look_up` follows.
+  SectoredCache::Line hit(const MemoryRequest& part, std::uint32_t& sectors) {
+    const SectoredCache::Line line = cache_.hit(part.address, part.bytes, is_write(part), sectors);
+    if (line != SectoredCache::no_line) looked_up(part, static_cast<unsigned>(__builtin_popcount(sectors)), 0);
+    return line;
+  }
+  LineAccess look_up(const MemoryRequest& part) {
+    const LineAccess done = cache_.access(part.address, part.bytes, is_write(part));
+    looked_up(part, static_cast<unsigned>(__builtin_popcount(done.sectors)),
+              static_cast<unsigned>(__builtin_popcount(done.missed)));
+    return done;
+  }
   /// In a line: so many sectors, of which so many were missed.
   void looked_up(const MemoryRequest& part, std::uint64_t sectors, std::uint64_t missed) {
     OfTraffic& counted = of_traffic_[static_cast<unsigned>(part.origin.traffic)];
@@ -206,6 +218,16 @@ class SectoredL2 final : public MemoryBehaviour {
   bool is_in_one_line(const MemoryRequest& request) const {
     return (request.address & last_of_line_) + request.bytes <= last_of_line_ + 1;
   }
+  /// Calls `each(part)` with what of a request is in each line, at the address that it is looked up at.
+  template <class Each>
+  void for_each_part(const MemoryRequest& request, Each&& each) const {
+    const std::uint64_t at = looked_up_at(request);
+    // As it is: a copy would wait for the stores that have just made it.
+    if (at == request.address && is_in_one_line(request)) return each(request);
+    for_each_line(at, request.bytes, [&](std::uint64_t address, std::uint32_t bytes) {
+      each(MemoryRequest{address, bytes, request.command, request.origin});
+    });
+  }
   /// Calls `piece(address, bytes)` with the part in each line of so many bytes from an address on.
   template <class Piece>
   void for_each_line(std::uint64_t address, std::uint64_t bytes, Piece&& piece) const {
@@ -232,9 +254,11 @@ class SectoredL2 final : public MemoryBehaviour {
   std::uint32_t bank_of_set(std::uint32_t set) const { return interleaving_.share(set).place; }
   /// Whether a bank has to serve the request whatever the order of accesses is.
   bool is_certain(const MemoryRequest& request) const;
-  static bool is_write(const MemoryRequest& request) { return request.command == tlm::TLM_WRITE_COMMAND; }
-  /// Of an access, the part in a line, at the address that it is looked up at.
-  void access_line(const MemoryRequest& part);
+  void access_part(const MemoryRequest& part, bool certain);
+  void access_below(MemoryRequest moved, bool certain) {
+    moved.is_certain = certain;
+    if (below_ != nullptr) below_->access(moved);
+  }
   struct OfTraffic {
     Counter sectors, misses;
   };

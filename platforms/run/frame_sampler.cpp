@@ -179,7 +179,6 @@ void FrameSampler::begin(Window& window) {
   const SampledWindow::Range range{is_first ? 0 : warm_up_quads_, measured_quads, &window == &windows_.back()};
   window.from = static_cast<double>(progress_->rasterized()) + range.from;
   window.to = window.from + measured_quads;
-  window.quads = measured_quads;
   window.primitives_from = window.primitives_to = progress_->counts().primitives;
   under_way_ = &window;
   run_ = std::make_unique<SampledWindow>(request_,
@@ -282,14 +281,15 @@ SampledWork FrameSampler::work_between(double from, double to) const {
   return work;
 }
 
-FrameSampler::Growth FrameSampler::growth_of(double Window::*of_window, double Window::*whole) const {
+template <class OfWindow, class Whole>
+FrameSampler::Growth FrameSampler::growth(const OfWindow& of_window, const Whole& whole) const {
   double sum = 0, squares = 0, wholes = 0;
   const std::size_t between = windows_.size() - 2;
   for (std::size_t i = 1; i <= between; ++i) {
-    const double growth = windows_[i].*of_window;
-    sum += growth;
-    squares += growth * growth;
-    wholes += windows_[i].*whole;
+    const double grown = of_window(windows_[i]);
+    sum += grown;
+    squares += grown * grown;
+    wholes += whole(windows_[i]);
   }
   const auto count = static_cast<double>(between);
   const double deviation = std::sqrt(std::max(0.0, count * squares - sum * sum) / (count - 1));
@@ -318,8 +318,10 @@ std::optional<FrameSampler::Result> FrameSampler::result() const {
   result.report.windows = windows_.size();
   result.report.measured_share = measured_ / cycles;
   result.report.warm_up_share = warm_up_ / cycles;
-  const Growth delay = growth_of(&Window::delay_growth, &Window::cycles);
-  const Growth lead = growth_of(&Window::lead_growth, &Window::quads);
+  const Growth delay = growth([](const Window& window) { return window.delay_growth; },
+                              [](const Window& window) { return window.cycles; });
+  const Growth lead =
+      growth([](const Window& window) { return window.lead_growth; }, [](const Window&) { return measured_quads; });
   result.report.delay_growth_percent = delay.percent;
   result.report.lead_growth_percent = lead.percent;
   result.front_end_is_settled = lead.is_within(most_lead_percent);

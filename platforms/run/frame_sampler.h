@@ -74,7 +74,6 @@ class FrameSampler {
     double from = 0, to = 0;        ///< quads rasterised before it and its end, in the course without time
     std::uint64_t primitives_from = 0, primitives_to = 0;  ///< issued before these
     double cycles = 0;
-    double quads = 0;         ///< rasterised in it
     double delay_growth = 0;  ///< cycles
     double lead_growth = 0;   ///< quads of primitives that were issued and not rasterised yet
   };
@@ -91,7 +90,9 @@ class FrameSampler {
     double percent, standard_error;
     bool is_within(double most) const { return std::fabs(percent) <= most + 2 * standard_error; }
   };
-  Growth growth_of(double Window::*of_window, double Window::*whole) const;
+  /// @param of_window, whole  by window
+  template <class OfWindow, class Whole>
+  Growth growth(const OfWindow& of_window, const Whole& whole) const;
 
   RunRequest request_;
   const Frame& frame_;

@@ -52,10 +52,6 @@ SampledWindow::SampledWindow(const RunRequest& request, const Frame& part, Range
   measured_ = std::async(std::launch::async, [this] { return measure(); });
 }
 
-SampledWindow::~SampledWindow() {
-  if (measured_.valid()) measured_.wait();
-}
-
 /// Passes of the rasteriser and of the end of the pipeline, whose mean each is: the one alone would see what is between them fill
 /// and empty.
 SampledWindow::Measured SampledWindow::measure() {

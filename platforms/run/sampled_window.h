@@ -38,9 +38,6 @@ class SampledWindow {
   /// @param drawn    by that; it is drawn on
   SampledWindow(const RunRequest& request, const Frame& part, Range range, const UntimedGpu& before,
                 Framebuffer& drawn);
-  /// Waits for its end.
-  ~SampledWindow();
-
   /// Waits for it. Throws what the simulation throws.
   Measured result() { return measured_.get(); }
 
@@ -55,7 +52,7 @@ class SampledWindow {
   const Configuration configuration_;
   Gpu gpu_;
   const FrameProgress progress_;
-  std::future<Measured> measured_;
+  std::future<Measured> measured_;  ///< whose end waits for that of the thread
 };
 
 }  // namespace vrpipe

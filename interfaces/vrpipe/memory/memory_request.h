@@ -34,11 +34,13 @@ struct MemoryRequest {
   bool is_certain = true;
 };
 
+constexpr bool is_write(const MemoryRequest& request) { return request.command == tlm::TLM_WRITE_COMMAND; }
+
 /// Whether some quad may have to wait for it. Vertices are read, and attributes written, also of what makes no quad any
 /// more; so a frame may end before that is done.
 constexpr bool is_for_quads(const MemoryRequest& request) {
   return request.origin.traffic != MemoryTraffic::vertex &&
-         (request.origin.traffic != MemoryTraffic::attribute || request.command == tlm::TLM_READ_COMMAND);
+         (request.origin.traffic != MemoryTraffic::attribute || !is_write(request));
 }
 
 /// What a payload of the base protocol has no place for. Ignorable: a memory that does not know it serves the access.
@@ -59,9 +61,7 @@ struct MemoryBytes {
   std::uint64_t read = 0;
   std::uint64_t written = 0;
 
-  void count(const MemoryRequest& request) {
-    (request.command == tlm::TLM_WRITE_COMMAND ? written : read) += request.bytes;
-  }
+  void count(const MemoryRequest& request) { (is_write(request) ? written : read) += request.bytes; }
   MemoryBytes& operator+=(const MemoryBytes& other) {
     read += other.read;
     written += other.written;
@@ -78,7 +78,7 @@ class MemoryTrafficCounters {
   explicit MemoryTrafficCounters(StatisticSet& owner);
 
   void count(const MemoryRequest& request) {
-    Moved& moved = moved_[static_cast<unsigned>(request.origin.traffic)][request.command == tlm::TLM_WRITE_COMMAND];
+    Moved& moved = moved_[static_cast<unsigned>(request.origin.traffic)][is_write(request)];
     ++moved.accesses;
     moved.bytes += request.bytes;
   }

@@ -306,9 +306,10 @@ class SectoredCache {
   void point_away(Set& set, Line line);
   Line free_line(std::uint32_t set);
   Line victim(std::uint32_t set);
-  /// Of those that can go the one that was used last longest ago, or `no_line`.
+  bool is_listed() const { return order_ == Order::list || order_ == Order::arrivals; }
+  /// By a list or the last uses: of those that can go the one that was used, or arrived, longest ago, or `no_line`.
   template <class CanGo>
-  Line longest_unused(std::uint32_t set, CanGo&& can_go) const;
+  Line first_in_order(std::uint32_t set, CanGo&& can_go) const;
   Line victim_not_kept(std::uint32_t set) const;
   template <class CanGo>
   Line victim_of_tree(std::uint32_t set, CanGo&& can_go) const;
