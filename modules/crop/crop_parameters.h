@@ -74,10 +74,10 @@ struct CropParameters : ParameterSet {
                             "for lines that come back; a line may go while quads wait to be blended into it"};
   Switch gob_lines{*this, "gob_lines", false, "left open by the paper; measured on a GH100 graphics GPC: on",
                    "a tile's colours are in memory in blocks of 32 bytes by 8 rows, not in Morton order"};
-  Switch gob_hazards{
-      *this, "gob_hazards", false, "left open by the paper; measured on a GH100 graphics GPC: on",
-      "without forwarding, pixels of a screen tile wait for one another that have the same place in a block of "
-      "64 bytes by 8 rows (a GOB), not only the same pixels"};
+  Switch gob_hazards{*this, "gob_hazards", false, "left open by the paper; measured on a GH100 graphics GPC: on",
+                     "without forwarding, pixels in a row of a screen tile wait for one another that have the same "
+                     "place in 64 bytes (the "
+                     "width of a GOB), not only the same pixels"};
   Integer rgba32f_latency_cycles{*this,
                                  "rgba32f_latency_cycles",
                                  0,

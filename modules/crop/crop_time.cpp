@@ -9,10 +9,11 @@
 namespace vrpipe {
 
 namespace {
-/// Of a position in a screen tile, the bits of its place in a block of 64 bytes by 8 rows.
-std::size_t place_in_gob(ColorFormat format) {
+/// Of a position in a screen tile, the bits of its row and of its place in 64 bytes of that.
+std::size_t place_in_64_bytes(ColorFormat format) {
   const std::size_t columns = 64 / (2 * bytes_per_pixel(format));
-  return std::min<std::size_t>(columns, quads_per_tile_row) - 1 + 3 * quads_per_tile_row;
+  constexpr std::size_t rows = positions_per_tile - quads_per_tile_row;
+  return rows | (std::min<std::size_t>(columns, quads_per_tile_row) - 1);
 }
 }  // namespace
 
@@ -36,7 +37,7 @@ CropTime::CropTime(const CropParameters& parameters, ColorFormat format)
       in_pairs_(parameters.pairs_in_sector && most_in_a_cycle > 1),
       most_kept_((in_pairs_ ? parts_of_a_cycle : price_) - 1),
       cycles_(static_cast<std::uint64_t>(parts_of_a_cycle)),
-      hazard_mask_(parameters.gob_hazards ? place_in_gob(format) : positions_per_tile - 1) {
+      hazard_mask_(parameters.gob_hazards ? place_in_64_bytes(format) : positions_per_tile - 1) {
   cache.check("CROP cache", "crop", "cache_bytes");
   const std::uint32_t quad = 4 * bytes_per_pixel(format);
   if (quad > cache.line_bytes) {
@@ -51,11 +52,9 @@ std::vector<WorkKind> CropTime::kinds() const {
   const auto cycles = [this](std::int64_t parts) {
     return static_cast<double>(parts) / static_cast<double>(parts_of_a_cycle);
   };
-  return {{"blend", 0, cycles(price_), true},
-          {"sectors", 0, cycles(sector_price_), false},
-          {"forwarding", 0, cycles(1), false},
-          {"unpaired", 0, cycles(1), false},
-          {"flits", 1, port.cycles_of_a_flit(), false}};
+  return {{"blend", 0, cycles(price_), true},           {"sectors", 0, cycles(sector_price_), false},
+          {"forwarding", 0, cycles(1), false},          {"unpaired", 0, cycles(1), false},
+          {"flits", 1, port.cycles_of_a_flit(), false}, {"reads", 0, 1, false}};
 }
 
 double CropTime::least_cycles(const Sum& sum) const {

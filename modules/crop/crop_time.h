@@ -122,6 +122,15 @@ class CropTime {
   bool quads_are_alike() const { return forwards && !in_pairs_ && column_parts_ == 0; }
   /// Whether that is all that takes time, but for sectors.
   bool is_plain() const { return quads_are_alike() && !port.is_on() && !fetches_ahead(); }
+  /// Whether the next quad to be looked up takes a place of its own in a queue, where tags run ahead: in pairs the second of a
+  /// sector shares that of the first.
+  bool takes_place(std::uint64_t line, std::uint32_t sectors) {
+    if (!in_pairs_) return true;
+    const bool shares = queued_.line == line && queued_.sectors == sectors && queued_.quads < most_in_a_cycle;
+    if (!shares) queued_ = {line, sectors, 0, 0};
+    ++queued_.quads;
+    return !shares;
+  }
   /// Whether a line may go while quads wait to be blended into it.
   bool fetches_ahead() const { return fetch_ahead_quads > 0; }
   Price price() const { return {price_, false}; }
@@ -152,6 +161,11 @@ class CropTime {
     open(at);
     done_ += parts;
     return true;
+  }
+  /// ZROP reads so many flits through the port: in a cycle for each nothing is blended.
+  void rest(unsigned flits, Cycle at) {
+    open(at);
+    done_ += flits * parts_of_a_cycle;
   }
   /// From when on no blend of the same pixels is in the pipeline, without forwarding; `now` does not go back.
   Cycle hazard_until(std::size_t place, LaneMask live, Cycle now) {
@@ -264,6 +278,7 @@ class CropTime {
   std::int64_t done_ = 0;      ///< parts from the beginning, those that were lost too
   Ring<Idle> idle_cache_;      ///< by the last blends of several cycles
   Group group_;                ///< the last quads that go together
+  Group queued_;               ///< of those that were looked up
   Cycle last_blend_ = 0;
   std::int64_t unpaired_ = 0;  ///< parts of the last quads' price beyond their rate's
   std::int64_t settled_ = 0;   ///< and of those before, not tallied yet

@@ -36,6 +36,7 @@ class TimedCrop : public TimedUnit {
                   [this](const PortReads& reads, CycleInterval visible) -> CycleInterval {
                     // What CROP has reserved for later would be behind them.
                     send(reads.flits, visible.first);
+                    if (time_.port.is_on()) reads_.push_in_order({visible.first, reads.flits}, &Sent::at);
                     return visible;
                   }),
         behaviour_(std::move(behaviour)),
@@ -113,9 +114,10 @@ class TimedCrop : public TimedUnit {
       monitor_->prefetch(place);
     }
     // Places in the queue, and lines that no queued quad needs.
-    SlotPool& places = fetches_ahead ? ahead_ : queue_;
-    Cycle at = places.free_from(visible.first, 1);
-    const Cycle has_places = places.free_from(std::max(at, visible.last), quads);
+    SlotPool& queue = fetches_ahead ? ahead_ : queue_;
+    const unsigned places = fetches_ahead ? places_of(warp, from, tile) : quads;
+    Cycle at = places > 0 ? queue.free_from(visible.first, 1) : visible.first;
+    const Cycle has_places = places > 0 ? queue.free_from(std::max(at, visible.last), places) : visible.last;
     if (pinned_cache_ != nullptr) {
       const std::uint64_t line = sectors_of(warp, from).line;
       const std::uint64_t address = surface.address(tile) + line * time_.cache.line_bytes;
@@ -144,7 +146,7 @@ class TimedCrop : public TimedUnit {
       time_.quads_are_alike() ? moves_.push({looked_up.last, moved}) : move_for_quads(warp, from, to, looked_up, moved);
     }
 
-    if (fetches_ahead) there = std::max(there, look_again(warp, from, looked_up.last));
+    if (fetches_ahead) there = std::max(there, look_again(warp, from, looked_up.last, places));
 
     charge(UnitState::starved, looked_up.first + 1);
     if (const Cycle room = std::max(out_.last(), out_.room_from()); room > there && !joins_signals(there)) {
@@ -155,7 +157,7 @@ class TimedCrop : public TimedUnit {
     const CycleInterval blended = blend_in_turn(warp, from, to, there);
     charge(UnitState::memory, blended.first);
     charge(UnitState::busy, blended.last + 1);
-    queue_.take(quads, blended);
+    if (places > 0) queue_.take(places, blended);
     if (pinned_cache_ != nullptr) pins_.pin(*pinned_cache_, cache_.lines[0].line, blended.last);
     any_blended_ = true;
     quads_last(blended.last + time_.latency_cycles, quads, [&](unsigned i) { return warp.draw[from + i]; });
@@ -186,7 +188,12 @@ class TimedCrop : public TimedUnit {
   }
   /// Takes the time of quads whose sectors are there from a cycle on.
   [[gnu::always_inline]] CycleInterval blend_in_turn(const ShadedWarp& warp, unsigned from, unsigned to, Cycle there) {
-    // What moves takes time from blending, from when it does.
+    // What moves takes time from blending, from when it does, and what ZROP reads.
+    for (; !reads_.empty() && reads_.front().at <= time_.free_from(time_.price(), there); reads_.pop()) {
+      const Sent& read = reads_.front();
+      time_.rest(read.flits, read.at);
+      did(CropWork::reads, read.flits, read.at);
+    }
     for (; !moves_.empty() && moves_.front().at <= time_.free_from(time_.price(), there); moves_.pop()) {
       const Move& move = moves_.front();
       if (time_.move(move.sectors, move.at)) did(CropWork::sectors, move.sectors, move.at);
@@ -265,13 +272,20 @@ class TimedCrop : public TimedUnit {
     return uses_[(line.address - behaviour_->surface()->address(0)) / time_.cache.line_bytes];
   }
 
+  /// In a queue, of a quad of a tile in the surface.
+  unsigned places_of(const ShadedWarp& warp, unsigned index, std::size_t tile) {
+    const QuadSectors& sectors = sectors_of(warp, index);
+    const std::uint64_t line =
+        behaviour_->surface()->address(tile) + std::uint64_t{sectors.line} * time_.cache.line_bytes;
+    return time_.takes_place(line, sectors.sectors) ? 1 : 0;
+  }
   /// The second look at the tag of a quad, as LinesAhead's; returns when its sectors are there.
-  [[gnu::noinline]] Cycle look_again(const ShadedWarp& warp, unsigned index, Cycle looked_up) {
+  [[gnu::noinline]] Cycle look_again(const ShadedWarp& warp, unsigned index, Cycle looked_up, unsigned places) {
     const auto& [line_of_tile, sectors] = sectors_of(warp, index);
     const CropBehaviour::LineAccess& line = cache_.lines[cache_.place_of[line_of_tile]];
     const LineVisits::Visit visit =
         visits_.of(behaviour_->surface()->grid().place(warp.tile, 0), warp.first_primitive[index]);
-    Cycle at = second_looks_.take(queue_.free_from(looked_up, 1), 1).first;
+    Cycle at = second_looks_.take(places > 0 ? queue_.free_from(looked_up, places) : looked_up, 1).first;
     Cycle there = at;
     const TimedLineUses::Look look = uses_of(line).look_again(visit, sectors, time_.cache.sectors_of_a_half(), at);
     if (look.again != 0) {
@@ -280,10 +294,11 @@ class TimedCrop : public TimedUnit {
       LineAccess again;
       again.address = line.address;
       again.filled = look.again;
-      there = memory_.fill_at_once(again, at);
+      const Cycle filled = memory_.fill_at_once(again, at);
+      if (look.comes_back) there = filled;
     }
-    second_looks_.hold(at);
-    ahead_.take(1, at + 1);  // second looks come after what arrives in their cycle
+    second_looks_.postpone(at);
+    if (places > 0) ahead_.take(places, at + 1);  // second looks come after what arrives in their cycle
     return std::max(there, at);
   }
 
@@ -360,6 +375,7 @@ class TimedCrop : public TimedUnit {
     unsigned flits = 0;
   };
   Ring<Sent> sent_;            ///< to the port, later than the last look-up
+  Ring<Sent> reads_;           ///< ZROP's, to which the blender has not given its time yet
   TimedFlitPort sent_before_;  ///< what was sent before it
   const BarrierPlan barriers_;
   EffectGate hazard_gate_;

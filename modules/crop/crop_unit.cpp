@@ -63,7 +63,9 @@ class CropUnit : public Unit {
     SectoredCache::Line line = SectoredCache::no_line;  ///< or its stay (LinesAhead)
     std::uint32_t sectors = 0;                          ///< of the line, a bit each
     std::uint32_t place = 0;                            ///< in the surface's grid
-    LinesAhead::Visit visit = 0;
+    // Where tags run ahead; in one word, since more would make an entry a quarter longer.
+    std::uint32_t visit : 31;
+    std::uint32_t takes_place : 1;
   };
 
   void end_of_elaboration() override {
@@ -137,26 +139,30 @@ class CropUnit : public Unit {
     if (stay == LinesAhead::no_stay) return false;
     pay(ahead_->take_moves());
     if (fills) ask(quad, place);
-    queue(quad, stay, sectors, place).visit = visits_.of(tile_place_, quad.warp->first_primitive[quad.index]);
+    Entry& entry = queue(quad, stay, sectors, place);
+    entry.visit = visits_.of(tile_place_, quad.warp->first_primitive[quad.index]) & 0x7FFFFFFFU;
+    entry.takes_place = time_.takes_place(address, sectors) ? 1U : 0U;
+    ahead_places_ += entry.takes_place;
     return true;
   }
   /// Quads in the queue, in their order.
   [[gnu::noinline]] bool look_again() {
     bool any = false;
     for (unsigned budget = time_.most_in_a_cycle;
-         budget > 0 && looked_twice_ < queue_.size() && looked_twice_ < time_.input_quads; --budget) {
+         budget > 0 && looked_twice_ < queue_.size() && places_ < time_.input_quads; --budget) {
       const Entry& next = queue_[looked_twice_];
       if (!ahead_->look_again(next.line, next.sectors, next.visit)) break;
       pay(ahead_->take_moves());
       ++looked_twice_;
+      ahead_places_ -= next.takes_place;
+      places_ += next.takes_place;
       any = true;
     }
     return any;
   }
   /// Places of the queue for what arrives.
   std::size_t room() const {
-    return Plain || !ahead_ ? time_.input_quads - queue_.size()
-                            : time_.fetch_ahead_quads - (queue_.size() - looked_twice_);
+    return Plain || !ahead_ ? time_.input_quads - queue_.size() : time_.fetch_ahead_quads - ahead_places_;
   }
   bool blends(const ColorQuad& quad) const {
     return Plain || !replaces_ || context_.state(quad.warp->draw[quad.index]).blend;
@@ -174,7 +180,13 @@ class CropUnit : public Unit {
   }
   /// ZROP's go first.
   [[gnu::noinline]] void take_reads() {
-    for (; in_reads_.ready() && port_is_open(); in_reads_.pop()) send(in_reads_.front().flits);
+    for (; in_reads_.ready() && port_is_open(); in_reads_.pop()) {
+      const unsigned flits = in_reads_.front().flits;
+      send(flits);
+      if (!time_.port.is_on()) continue;
+      time_.rest(flits, now());
+      did(CropWork::reads, flits, now());
+    }
   }
   [[gnu::noinline]] void send(unsigned flits) {
     if (flits == 0 || !time_.port.is_on()) return;
@@ -306,6 +318,7 @@ class CropUnit : public Unit {
     if (!Plain && ahead_) {
       ahead_->blended(entry.line, entry.sectors, changed, entry.visit);
       --looked_twice_;
+      places_ -= entry.takes_place;
       return pay(ahead_->take_moves());
     }
     if (changed) port_.cache().make_dirty(entry.line, entry.sectors);
@@ -386,7 +399,8 @@ class CropUnit : public Unit {
   std::uint64_t tile_address_ = 0;
   // Where tags run ahead of data:
   std::optional<LinesAhead> ahead_;
-  std::size_t looked_twice_ = 0;  ///< quads at the front of the queue
+  std::size_t looked_twice_ = 0;                 ///< quads at the front of the queue
+  std::uint32_t ahead_places_ = 0, places_ = 0;  ///< taken between the two looks, and behind them
   VisitCounter visits_;
   CropBehaviour::Outcomes outcomes_;  ///< of the warp whose quads' turn it is
   Cycle waits_from_ = never;          ///< the quad whose turn it is has waited for nothing but the blender

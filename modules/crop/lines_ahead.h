@@ -17,9 +17,9 @@ namespace vrpipe {
 /// architecture", 1998): a line goes for another though quads wait to be blended into it, so that more lines are under
 /// way than the cache holds. What it held is written back once the last of them has been.
 ///
-/// Tags are looked at twice. A first look asks for sectors at once; quads then wait, in order, for a second. What was asked for
-/// while quads still waited to be blended into an earlier stay of the line is fetched again there, and quads stop there for
-/// lines that come back (LineVisits).
+/// Tags are looked at twice. A first look asks for sectors at once; quads then wait, in order, for a second, where they stop for
+/// lines that come back (LineVisits). What was asked for while quads still waited to be blended into an earlier stay of the
+/// line is fetched again there; quads wait for that where the line comes back.
 class LinesAhead {
  public:
   /// A stay of a line in the cache, by number.
@@ -73,13 +73,14 @@ class LinesAhead {
     State& stay = stays_[number];
     LineUses& uses = uses_[index(stay.address)];
     if (stay.is_new) {
-      if (!uses.begin(stay.fetches_again ? sectors : 0, half_)) return false;
+      if (!uses.begin(stay.fills ? sectors : 0, half_)) return false;
       stay.is_new = false;
     }
     if (!uses.may_go(visit, sectors, half_)) return false;
     bool is_first = false;
     const std::uint32_t again = uses.go(sectors, half_, is_first);
     if (!stay.fetches_again || again == 0) return true;
+    stay.waits_again = uses.comes_back();
     if (is_first) ++moves_.flits;
     stay.filling_again |= again;
     fetched_again_ += static_cast<unsigned>(__builtin_popcount(again));
@@ -114,7 +115,7 @@ class LinesAhead {
   /// Whether a quad whose turn it is to be blended still waits for sectors.
   bool is_awaited(Stay number, std::uint32_t sectors) const {
     const State& stay = stays_[number];
-    return ((stay.filling | stay.filling_again) & sectors) != 0;
+    return ((stay.filling | (stay.waits_again ? stay.filling_again : 0)) & sectors) != 0;
   }
 
   /// A quad has been blended.
@@ -139,7 +140,9 @@ class LinesAhead {
     bool left = false;        ///< the line has gone for another
     bool ended = false;
     bool is_new = true;          ///< nothing was looked up twice
+    bool fills = false;          ///< what it began with asked for sectors
     bool fetches_again = false;  ///< it began before the one before it had ended
+    bool waits_again = false;    ///< and comes back
   };
   struct Request {
     enum Kind : std::uint8_t { fill, fill_again, write_back };
@@ -165,8 +168,9 @@ class LinesAhead {
     State& stay = stays_[number];
     stay = {};
     stay.address = access.address;
+    stay.fills = access.filled != 0;
     Stay& latest = latest_[index(access.address)];
-    stay.fetches_again = latest != no_stay && access.filled != 0;
+    stay.fetches_again = stay.fills && latest != no_stay;
     latest = number;
     stay_of_line_[access.line] = number;
   }

@@ -31,7 +31,7 @@ class TimedZCache {
         port_(owner, "memory", timing_.mshrs, std::min(sectors_of_a_line_, timing_.mshrs),
               timing_.organization.sector_bytes, statistics,
               {MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(placement.gpc)}),
-        early_(time.quads_per_cycle, std::max(timing_.input_quads, QuadBeat::capacity)),
+        early_(time.quads_per_cycle, std::max(timing_.places(), QuadBeat::capacity)),
         late_(time.quads_per_cycle, std::max(timing_.input_quads, quads_per_warp)),
         updates_(time.updates_per_cycle),
         foreseen_(time.updates_per_cycle),
@@ -72,13 +72,14 @@ class TimedZCache {
   }
   /// In its turn; `tested` follows.
   Times look_up(const QuadBeat& beat, Cycle turn, bool needs_stencil) {
+    places_ = timing_.places_of(beat);
     if (!needs_stencil) return {turn, turn};
     Times times = look_up(beat, turn, early_);
     if (timing_.fetches_ahead()) times.there = std::max(times.there, look_again(beat, times.at));
     return times;
   }
-  void tested(unsigned quads, bool needs_stencil, Cycle at) {
-    early_.queue.take(quads, at);
+  void tested(bool needs_stencil, Cycle at) {
+    early_.queue.take(places_, at);
     if (!timing_.fetches_ahead() || !needs_stencil) return;
     for (unsigned i = 0; i < needed_.count; ++i) {
       const BeatLines::Needed::Line& line = needed_.lines[i];
@@ -158,7 +159,7 @@ class TimedZCache {
     Way(unsigned quads_per_cycle, unsigned places) : look_ups(quads_per_cycle), queue(places) {}
     Cycle turn(unsigned quads, Cycle visible) { return look_ups.take(quads, queue.free_from(visible, quads)); }
     BatchLimit look_ups;
-    SlotPool queue;  ///< quads between look-up and test
+    SlotPool queue;  ///< between look-up and test
     Cycle read = 0;  ///< the last line looked up for a test
   };
   Times look_up(const QuadBeat& beat, Cycle turn, Way& way) {
@@ -214,23 +215,23 @@ class TimedZCache {
   /// The second look at the lines of one primitive's quads, as ZLinesAhead's; returns when they are there.
   [[gnu::noinline]] Cycle look_again(const QuadBeat& beat, Cycle looked_up) {
     const LineVisits::Visit visit = visits_.of(lines_->tile(beat.tile), primitive_order(beat.quads[0]));
-    Cycle at = second_looks_.take(early_.queue.free_from(looked_up, beat.count));
+    Cycle at = second_looks_.take(early_.queue.free_from(looked_up, places_));
     Cycle there = at;
     for (unsigned i = 0; i < needed_.count; ++i) {
       const BeatLines::Needed::Line& needed = needed_.lines[i];
+      const TimedLineUses::Look look =
+          uses_[lines_->index(needed.address)].look_again(visit, lines_->in_halves(needed.address, needed.sectors),
+                                                          half(), at);
       LineAccess again;
       again.address = needed.address;
-      again.filled =
-          needed.sectors & uses_[lines_->index(needed.address)]
-                               .look_again(visit, lines_->in_halves(needed.address, needed.sectors), half(), at)
-                               .again;
+      again.filled = look.comes_back ? needed.sectors & look.again : 0;
       if (again.filled == 0) continue;
       // First looks of later beats may be long before.
       if (const unsigned flits = flits_of(needed.address, again.filled, 0); flits > 0)
         out_reads_.send_beside({flits}, at);
       there = std::max(there, port_.fill(again, at));
     }
-    second_looks_.hold(at);
+    second_looks_.hold(at + 1);
     lines_ahead_.take(needed_.count, at + 1);  // second looks come after what arrives in their cycle
     owe(at);
     return std::max(there, at);
@@ -271,6 +272,7 @@ class TimedZCache {
   std::optional<SectoredCache> cache_;
   std::optional<ClearedSectors> cleared_;
   BeatLines::Needed needed_;
+  unsigned places_ = 0;            ///< that the beat looked up last takes of its queue
   std::vector<Cycle> kept_until_;  ///< by line of the cache
   const bool pins_lines_;
   TimedPins pins_;

@@ -6,10 +6,21 @@
 
 namespace vrpipe {
 
+unsigned halves_of_blocks(const Quad* quads, unsigned count) {
+  unsigned halves = 0;  // a bit each
+  for (unsigned i = 0; i < count; ++i) {
+    const unsigned column = quads[i].position % quads_per_tile_row;
+    const unsigned row = quads[i].position / quads_per_tile_row;
+    halves |= 1U << (row / 4 * 4 + column / 2);
+  }
+  return static_cast<unsigned>(__builtin_popcount(halves));
+}
+
 ZCache::ZCache(const ZropParameters& parameters, DepthFormat format)
     : organization(parameters.cache.organization()),
       mshrs(parameters.mshrs),
       input_quads(parameters.input_quads),
+      input_halves(parameters.input_halves),
       input_updates(parameters.input_updates),
       sectors_per_cycle(parameters.sectors_per_cycle),
       fast_clear(parameters.fast_clear),

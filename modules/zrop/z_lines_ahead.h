@@ -34,8 +34,8 @@ class ReadFlits {
 
 /// The z-cache at cycle where its tags run ahead of its data: what a test misses is read for it, and the line may go
 /// meanwhile. Tags are looked at twice, as CROP's are: a first look asks for what is missed, at once; beats then wait, in
-/// their order, for a second. What was asked for while an earlier stay of the line in the cache was still to be used is read
-/// again there, and beats stop there for lines that come back (LineVisits). A beat is here one primitive's, and halves of 8x8 blocks, 4x8 pixels, are what it asks for.
+/// their order, for a second, where they stop for lines that come back, which are read again (LineVisits). A beat is here one
+/// primitive's, and halves of 8x8 blocks, 4x8 pixels, are what it asks for.
 class ZLinesAhead {
  public:
   /// All outlive it; `cleared` may be null.
@@ -49,29 +49,23 @@ class ZLinesAhead {
         half_(timing.organization.sectors_of_a_half()),
         mshrs_(timing.mshrs),
         read_of_line_(timing.organization.lines()),
-        states_(lines.lines()) {}
+        uses_(lines.lines()) {}
 
   /// What a beat waits for.
   struct Waits {
     std::uint64_t reads = 0;   ///< the last of those that were asked for at first looks
     unsigned reads_again = 0;  ///< of its own
     std::uint32_t visit = 0;
-    std::uint16_t begins = 0;    ///< lines that came into the cache for it, a bit each
-    std::uint16_t are_used = 0;  ///< and were still to be used
+    std::uint16_t begins = 0;  ///< lines that came into the cache for it, a bit each
   };
 
   /// Goes on with the first look at a line, the `at`th of a beat; false while it has to wait.
   template <class Moved>
   bool look_up(CachePort::LookUp& wanted, unsigned at, Waits& waits, Moved&& moved) {
-    State& state = states_[lines_.index(wanted.address)];
     bool came = false;
-    if (!look_up(wanted, left_, waits.reads, moved, came)) {
-      if (came) note(state, at, waits);
-      return false;
-    }
-    if (came) note(state, at, waits);
-    ++state.to_come;
-    return true;
+    const bool done = look_up(wanted, left_, waits.reads, moved, came);
+    if (came) waits.begins = static_cast<std::uint16_t>(waits.begins | 1U << at);
+    return done;
   }
   /// The only look at a line for a late test; `left`: sectors yet to be read, between calls, and `reads` becomes the last
   /// read that it waits for.
@@ -97,9 +91,7 @@ class ZLinesAhead {
     BeatLines::Needed needed;
     lines_.find(beat.tile, beat.quads.data(), beat.count, needed);
     for (unsigned i = 0; i < needed.count; ++i) {
-      State& state = states_[lines_.index(needed.lines[i].address)];
-      --state.to_come;
-      state.uses.used(waits.visit, needed_halves(needed.lines[i]), half_);
+      uses_[lines_.index(needed.lines[i].address)].used(waits.visit, needed_halves(needed.lines[i]), half_);
     }
   }
 
@@ -135,16 +127,6 @@ class ZLinesAhead {
  private:
   static constexpr std::uint32_t again_tag = 1U << 30U;
   static constexpr std::uint32_t id_mask = again_tag - 1;
-  /// Of a line of the surface.
-  struct State {
-    LineUses uses;              ///< by beats that were looked up twice
-    std::uint32_t to_come = 0;  ///< beats that were looked up and not tested
-    bool reads_again = false;
-  };
-  static void note(const State& state, unsigned at, Waits& waits) {
-    waits.begins = static_cast<std::uint16_t>(waits.begins | 1U << at);
-    if (state.to_come > 0) waits.are_used = static_cast<std::uint16_t>(waits.are_used | 1U << at);
-  }
 
   template <class Moved>
   bool look_up(CachePort::LookUp& wanted, std::uint32_t& left, std::uint64_t& reads, Moved&& moved, bool& came) {
@@ -182,19 +164,18 @@ class ZLinesAhead {
 
   template <class Moved>
   bool look_again(const BeatLines::Needed::Line& line, std::uint64_t number, Waits& waits, Moved&& moved) {
-    State& state = states_[lines_.index(line.address)];
+    LineUses& uses = uses_[lines_.index(line.address)];
     const auto bit = static_cast<std::uint16_t>(1U << at_);
     if (left_again_ == 0) {
       const std::uint32_t halves = needed_halves(line);
       if ((waits.begins & bit) != 0) {
-        if (!state.uses.begin(halves, half_)) return false;
-        state.reads_again = (waits.are_used & bit) != 0;
+        if (!uses.begin(halves, half_)) return false;
         waits.begins = static_cast<std::uint16_t>(waits.begins & ~bit);
       }
-      if (!state.uses.may_go(waits.visit, halves, half_) || !flits_.has_room()) return false;
+      if (!uses.may_go(waits.visit, halves, half_) || !flits_.has_room()) return false;
       bool is_first = false;
-      const std::uint32_t lacking = state.uses.go(halves, half_, is_first);
-      left_again_ = state.reads_again ? lacking & line.sectors : 0;
+      const std::uint32_t lacking = uses.go(halves, half_, is_first);
+      left_again_ = uses.comes_back() ? lacking & line.sectors : 0;
       flits_.read(line.address, left_again_, 0);
     }
     while (left_again_ != 0) {
@@ -244,7 +225,7 @@ class ZLinesAhead {
   BeatLines::Needed needed_;
   unsigned at_ = 0;  ///< of the lines needed
   std::uint32_t left_again_ = 0;
-  std::vector<State> states_;
+  std::vector<LineUses> uses_;  ///< by line of the surface: of beats that were looked up twice
 };
 
 }  // namespace vrpipe

@@ -99,7 +99,7 @@ class ZPort {
   }
   const QuadBeat& front() const { return beats_.front().beat; }
   void pop() {
-    queued_quads_ -= beats_.front().beat.count;
+    queued_ -= beats_.front().places;
     if (ahead_) use();
     beats_.pop();
   }
@@ -140,6 +140,7 @@ class ZPort {
   struct Beat {
     QuadBeat beat;
     unsigned lines = 0;
+    unsigned places = 0;       ///< of the queue
     ZLinesAhead::Waits waits;  ///< where tags do not run ahead, for reads of lines alone
   };
   struct Read {
@@ -176,11 +177,11 @@ class ZPort {
   [[gnu::noinline]] bool look_again() {
     if (looked_twice_ == beats_.size()) return false;
     Beat& next = beats_[looked_twice_];
-    if (looked_twice_ > 0 && queued_quads_ + next.beat.count > timing_.input_quads) return false;
+    if (looked_twice_ > 0 && queued_ + next.places > timing_.places()) return false;
     if (reads_early(next.beat) && !ahead_->look_again(next.beat, beats_tested_ + looked_twice_, next.waits, moves()))
       return false;
     lines_ahead_ -= next.lines;
-    queued_quads_ += next.beat.count;
+    queued_ += next.places;
     ++looked_twice_;
     return true;
   }
@@ -239,10 +240,11 @@ class ZPort {
       queued.beat = part_;
       queued.waits = waits_of_beat_;
       queued.lines = needed_.count;
+      queued.places = timing_.places_of(part_);
       if (ahead_) {
         lines_ahead_ += needed_.count;
       } else {
-        queued_quads_ += part_.count;
+        queued_ += queued.places;
       }
       taken_ += part_.count;
       moved = true;
@@ -278,7 +280,7 @@ class ZPort {
   /// To look a beat up, or what is of its next primitive where tags run ahead; false if that has to wait.
   bool begin(const QuadBeat& beat) {
     if (ahead_ ? lines_ahead_ >= timing_.fetch_ahead_lines
-               : !beats_.empty() && queued_quads_ + beat.count > timing_.input_quads)
+               : !beats_.empty() && queued_ + beat.count > timing_.input_quads)
       return false;
     if (taken_ == 0) {
       const unsigned width = std::max<unsigned>(beat.count, 1);
@@ -310,7 +312,7 @@ class ZPort {
     for (unsigned i = taken_; i < beat.count && primitive_order(beat.quads[i]) == primitive; ++i)
       part_.quads[part_.count++] = beat.quads[i];
     part_.last_of_bin = beat.last_of_bin && taken_ + part_.count == beat.count;
-    waits_of_beat_ = {waits_of_beat_.reads, 0, visits_.of(lines_->tile(beat.tile), primitive), 0, 0};
+    waits_of_beat_ = {waits_of_beat_.reads, 0, visits_.of(lines_->tile(beat.tile), primitive), 0};
   }
   void clear_at(Mark mark) {
     if (cleared_ && context_.frame->clears_depth_stencil(mark)) cleared_->clear();
@@ -387,8 +389,8 @@ class ZPort {
 
   Ring<BeatLines::Needed::Line> changed_;  ///< by tests, and not put back yet
   Ring<Beat> beats_;                       ///< looked up, and not tested
-  unsigned queued_quads_ = 0;              ///< looked up twice, where there are two looks
-  Ring<Read> reads_;                       ///< lines of these, that are not read yet
+  unsigned queued_ = 0;  ///< places taken: by beats that were looked up twice, where there are two looks
+  Ring<Read> reads_;     ///< lines of these, that are not read yet
   std::uint64_t reads_asked_ = 0;
   std::uint64_t reads_done_ = 0;
   Ring<Update> updates_;  ///< looked up, and not applied

@@ -38,6 +38,16 @@ struct ZropParameters : ParameterSet {
                       "quads",
                       "ATTILA: fetch queue of 256 stamps for each that a ROP tests in a cycle",
                       "between z-cache look-up and test; hides the latency of fills; at least a beat"};
+  Integer input_halves{
+      *this,
+      "input_halves",
+      0,
+      0,
+      65536,
+      "halves of blocks",
+      "left open by the paper; measured on a GH100 graphics GPC: 300 to 400",
+      "between the second look at tags, if there is one, and the test, in place of input_quads: each of 4x8 "
+      "pixels in which a primitive has quads; 0: input_quads"};
   Integer input_updates{*this,        "input_updates",
                         64,           1,
                         65536,        "signals",
@@ -59,7 +69,7 @@ struct ZropParameters : ParameterSet {
                     0,
                     100,
                     "cycles",
-                    "left open by the paper; measured on a GH100 graphics GPC: 1.4",
+                    "left open by the paper; measured on a GH100 graphics GPC: 1.5 to 1.9",
                     "the least that such a block takes"};
   Integer fetch_ahead_lines{*this,
                             "fetch_ahead_lines",

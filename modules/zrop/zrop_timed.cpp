@@ -176,7 +176,7 @@ class TimedZrop : public TimedUnit {
         ready = look_up(beat, ready, begins ? std::min(of_beat, total - from) : 0, needs_stencil, looked_up);
       }
       const Cycle at = take(ready, beat.count);
-      if (has_cache_) z_.tested(beat.count, needs_stencil, at);
+      if (has_cache_) z_.tested(needs_stencil, at);
       const unsigned tested_quads = beat.count;
       port_free_at_ = time_.end_of_tests(at, tested_quads);
       if (blocks_.is_on()) pay_for_blocks(beat, at);

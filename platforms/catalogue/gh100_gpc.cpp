@@ -25,12 +25,14 @@ Platform gh100_gpc() {
       // 32 bins of 16x16 pixels, first in, first out: the defaults. Two quads part from a gap of 151 cycles on, of which nine
       // are the second's way.
       {"tc", "idle_timeout_cycles", "160"},
-      // 8 quads a cycle of full blocks, each touched half of one a cycle; a line is two blocks of stencil.
+      // 8 quads a cycle of full blocks, each touched half of one a cycle, a block at least 1.5; a line is two blocks of stencil.
       {"zrop", "quads_per_cycle", "8"},
       {"zrop", "half_block_cycles", "1"},
+      {"zrop", "block_cycles", "1.5"},
       {"zrop", "cache_bytes", "16384"},
       {"zrop", "line_bytes", "512"},
       {"zrop", "fetch_ahead_lines", "256"},
+      {"zrop", "input_halves", "384"},
       {"zrop", "fast_clear", "off"},
       {"zrop", "mshrs", "2048"},
       // 64 quads to an SM, SMs in turn; 3.2 quads a cycle, 4 to 5.2 cycles a primitive and screen tile.

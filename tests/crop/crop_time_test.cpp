@@ -163,7 +163,7 @@ TEST(CropTime, WithoutForwardingAQuadWaitsForOneOfTheSamePixels) {
   EXPECT_EQ(time.hazard_until(3, all_lanes, 19), 0U);
 }
 
-TEST(CropTime, QuadsWaitForThoseOfTheSamePlaceInABlockOf64BytesBy8Rows) {
+TEST(CropTime, QuadsWaitForThoseInTheirRowOfTheSamePlaceIn64Bytes) {
   const std::pair<ColorFormat, unsigned> columns[] = {{ColorFormat::rgba8, 8},
                                                       {ColorFormat::rgba16f, 4},
                                                       {ColorFormat::rgba32f, 2}};
@@ -175,12 +175,24 @@ TEST(CropTime, QuadsWaitForThoseOfTheSamePlaceInABlockOf64BytesBy8Rows) {
         first.place = 5 * positions_per_tile;
         return time.hazard_until(place, all_lanes, blended(time, first, 10) + 1) != 0;
       };
-      const bool same = position % quads_per_tile_row % width == 0 && position / quads_per_tile_row % 4 == 0;
+      const bool same = position % quads_per_tile_row % width == 0 && position / quads_per_tile_row == 0;
       EXPECT_EQ(waits("on", 5 * positions_per_tile + position), same) << name_of(format) << ' ' << position;
       EXPECT_EQ(waits("off", 5 * positions_per_tile + position), position == 0) << name_of(format) << ' ' << position;
       EXPECT_FALSE(waits("on", 6 * positions_per_tile + position)) << "another tile";
     }
   }
+}
+
+TEST(CropTime, ThePairOfASectorSharesAPlaceWhereTagsRunAhead) {
+  CropTime time = time_of({{"bytes_per_cycle", "32"}, {"pairs_in_sector", "on"}}, ColorFormat::rgba8);
+  EXPECT_TRUE(time.takes_place(256, 1));
+  EXPECT_FALSE(time.takes_place(256, 1));
+  EXPECT_TRUE(time.takes_place(256, 1)) << "a third";
+  EXPECT_TRUE(time.takes_place(256, 2)) << "another sector";
+  EXPECT_TRUE(time.takes_place(512, 2)) << "another line";
+  CropTime one = time_of({{"bytes_per_cycle", "32"}, {"pairs_in_sector", "on"}}, ColorFormat::rgba16f);
+  EXPECT_TRUE(one.takes_place(256, 1));
+  EXPECT_TRUE(one.takes_place(256, 1)) << "a quad a cycle";
 }
 
 TEST(CropTime, ABlendOfRgba32fMayTakeLonger) {

@@ -291,6 +291,21 @@ TEST_P(CropPrices, PartsOfTheOccupancyAreItsTimeAtRatesBetweenWholeQuads) {
   }
 }
 
+TEST_P(CropPrices, TheBlenderRestsACycleForAFlitThatZropReads) {
+  const auto cycles = [this](unsigned reads, unsigned flits) {
+    TimedCropBench crop(GetParam(), context, partition());
+    auto& in = crop.bench.source<PortReads>("in_reads", 64);
+    for (unsigned i = 0; i < reads; ++i) in.add({flits}, Cycle{150 + 4 * i});
+    for (unsigned i = 0; i < 1000; ++i) crop.quad({0, 0}, in_memory_order(i % 64), 0.0F);
+    const Cycle end = crop.run();
+    EXPECT_DOUBLE_EQ(testing::occupied(crop.bench.unit(), CropWork::reads), reads * flits);
+    return end;
+  };
+  const Cycle alone = cycles(0, 0);
+  EXPECT_EQ(cycles(50, 1), alone + 50) << "of opacity 0 nothing is written, so that the port has time";
+  EXPECT_EQ(cycles(50, 2), alone + 100);
+}
+
 TEST_P(CropPrices, QuadsInPairsTakeLessThanTheirLines) {
   context.format = ColorFormat::rgba8;
   for (const char* forwarding : {"on", "off"}) {

@@ -55,6 +55,23 @@ TEST(LineUses, OfOtherHalvesDoNotHoldTheFirstVisit) {
   EXPECT_TRUE(line.begin(0b0010'0000, half));
 }
 
+TEST(LineUses, OfALineThatNeedNotStopAskForNothingAgain) {
+  LineUses line;
+  bool is_first = false;
+  ASSERT_TRUE(line.begin(0b0001, half));
+  line.may_go(0, 0b0001, half);
+  line.go(0b0001, half, is_first);
+  line.used(0, 0b0001, half);
+  ASSERT_TRUE(line.begin(0b0001, half)) << "used in time, if after the first look";
+  EXPECT_FALSE(line.comes_back());
+  line.may_go(1, 0b0001, half);
+  line.go(0b0001, half, is_first);
+  ASSERT_FALSE(line.begin(0b0001, half));
+  line.used(1, 0b0001, half);
+  ASSERT_TRUE(line.begin(0b0001, half));
+  EXPECT_TRUE(line.comes_back());
+}
+
 /// What is looked at: a visit's sectors, and whether the line has come into its cache for that.
 struct Look {
   LineVisits::Visit visit = 0;
@@ -78,7 +95,8 @@ Outcome timed(const std::vector<Look>& all) {
   for (const Look& look : all) {
     if (look.comes) line.come(look.first_look, true);
     at = std::max(at, look.first_look + 1);
-    outcome.again.push_back(line.look_again(look.visit, look.sectors, half, at).again);
+    const TimedLineUses::Look found = line.look_again(look.visit, look.sectors, half, at);
+    outcome.again.push_back(found.comes_back ? found.again : 0);
     outcome.looks.push_back(at);
     line.used(look.sectors, half, at + trip);
     ++at;
@@ -91,7 +109,6 @@ Outcome cycle_by_cycle(const std::vector<Look>& all) {
   LineUses line;
   std::deque<std::pair<Cycle, std::size_t>> uses;
   bool has_come = false;
-  bool asks_again = false;
   for (Cycle now = 0; outcome.looks.size() < all.size(); ++now) {
     const Look& look = all[outcome.looks.size()];
     for (; !uses.empty() && uses.front().first <= now; uses.pop_front()) {
@@ -102,12 +119,11 @@ Outcome cycle_by_cycle(const std::vector<Look>& all) {
     if (look.comes && !has_come) {
       if (!line.begin(look.sectors, half)) continue;
       has_come = true;
-      asks_again = !outcome.looks.empty() && outcome.looks.back() + trip > look.first_look;
     }
     if (!line.may_go(look.visit, look.sectors, half)) continue;
     bool is_first = false;
     const std::uint32_t lacking = line.go(look.sectors, half, is_first);
-    outcome.again.push_back(asks_again ? lacking : 0);
+    outcome.again.push_back(line.comes_back() ? lacking : 0);
     uses.emplace_back(now + trip, outcome.looks.size());
     outcome.looks.push_back(now);
     has_come = false;

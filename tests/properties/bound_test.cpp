@@ -59,6 +59,7 @@ rc::Gen<Setting> setting() {
                                            {"zrop", "half_block_cycles", {"0.3", "1"}},
                                            {"zrop", "block_cycles", {"1.4", "7"}},
                                            {"zrop", "fetch_ahead_lines", {"1", "256"}},
+                                           {"zrop", "input_halves", {"1", "384"}},
                                            {"sm", "warp_launch_cycles", {"0.5", "2.5"}},
                                            {"sm", "visit_launch_cycles", {"4", "11.5"}},
                                            {"sm", "discard_launch_cycles", {"1.2"}},
@@ -86,7 +87,7 @@ TEST(Bound, LetsQuadsShareTheLastCycleOfABlock) {
   }
   RunRequest r = request(variant_named("baseline"), ColorFormat::rgba8, Fidelity::bound);
   r.platform = &platform_named("gh100-gpc");
-  r.settings = {{"tc", "bin_quads", "4"}, {"zrop", "block_cycles", "1.9"}};
+  r.settings = {{"tc", "bin_quads", "4"}, {"zrop", "block_cycles", "1.9"}, {"zrop", "input_halves", "0"}};
   Frame frame(256, 256);
   DrawState state = draw_state_of(r);
   state.stencil.test = true;

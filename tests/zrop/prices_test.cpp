@@ -253,6 +253,21 @@ TEST_P(ZropPrices, AFlitReadsAHalfOfABlock) {
   EXPECT_EQ(flits_of({{quad_at(0)}, {quad_at(2)}}), 2U);
 }
 
+TEST_P(ZropPrices, LinesComeBackAsFarAsTheQueueBehindTheSecondLookReaches) {
+  // Two halves of each of 40 tiles in turn, with 33 of which a line has left the cache when it comes again.
+  std::vector<Bin> bins;
+  for (unsigned i = 0; i < 400; ++i)
+    bins.push_back({{static_cast<std::uint16_t>(i % 40), 0}, {quad_at(0, i), quad_at(1, i), quad_at(2, i)}});
+  const auto reads_with = [&](const char* halves) {
+    Bench::Settings settings = small_cache;
+    settings.emplace_back("input_halves", halves);
+    run(bins, settings, true, 400);
+    return reads;
+  };
+  EXPECT_EQ(reads_with("60"), 800U) << "a tile's halves are used before it is looked at again";
+  EXPECT_EQ(reads_with("200"), 800U + 9 * 2) << "the first tile of each round but one stops";
+}
+
 TEST_P(ZropPrices, AheadOfItsDataMoreLinesAreUnderWayThanTheCacheHolds) {
   std::vector<Bin> bins;
   for (unsigned i = 0; i < 128; ++i) bins.push_back({{static_cast<std::uint16_t>(i), 0}, {quad_at(0, i)}});

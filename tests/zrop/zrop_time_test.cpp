@@ -46,6 +46,22 @@ TEST(ZropTime, SectorsMayMoveInTheLastCycleOfABlockAndNobodyWaitsForTheLastBeat)
   EXPECT_EQ(least(time, {160, 0, 0, 0, 20'000}, true), (std::vector<double>{10, 0, 0, 0, 0}));
 }
 
+TEST(ZropTime, BehindASecondLookTheQueueMayHoldHalvesOfBlocks) {
+  QuadBeat beat;
+  // By columns and rows of 2 and 4 quads: two of the first half, one of that below, two in the right block's halves.
+  for (const unsigned position : {0U, 9U, 32U, 4U, 7U})
+    beat.quads[beat.count++].position = static_cast<std::uint8_t>(position);
+  const ZropTime halves = time_of({{"fetch_ahead_lines", "256"}, {"input_quads", "100"}, {"input_halves", "30"}});
+  EXPECT_EQ(halves.z_cache.places(), 30U);
+  EXPECT_EQ(halves.z_cache.places_of(beat), 4U);
+  for (const Settings& settings : {Settings{{"fetch_ahead_lines", "256"}, {"input_quads", "100"}},
+                                   Settings{{"input_quads", "100"}, {"input_halves", "30"}}}) {
+    const ZropTime quads = time_of(settings);
+    EXPECT_EQ(quads.z_cache.places(), 100U);
+    EXPECT_EQ(quads.z_cache.places_of(beat), 5U);
+  }
+}
+
 TEST(ZropTime, SectorsOfLookUpsThatRanAheadAreLeftOut) {
   const ZropTime time = time_of({{"input_quads", "100"}, {"sectors_per_cycle", "16"}});
   EXPECT_EQ(time.sectors_not_ahead(99), 0U);

@@ -33,7 +33,7 @@ struct WorkKind {
 };
 
 /// Kinds that a unit may have.
-constexpr unsigned most_work_kinds = 8;
+constexpr unsigned most_work_kinds = 10;
 /// Throws SimulationFault: a unit did work of a kind that it has not declared.
 [[noreturn]] void refuse_work_kind(const std::string& unit, unsigned kind);
 

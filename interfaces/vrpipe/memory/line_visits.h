@@ -15,6 +15,8 @@ namespace vrpipe {
 ///
 /// * When a line has come into the cache again, its first visit stops until what the line held before has been used, in the
 ///   halves of the line that the visit needs. If it has to stop, the line comes back.
+/// * What was asked for of a line that comes back was asked for in vain, and is asked for again at the second look; of colours also
+///   what was asked for while an earlier use was still to come, but nothing waits for that (measured in sectors moved).
 /// * A line that comes back takes no sectors side by side: a visit that lacks some, in a half of which an earlier one has
 ///   asked for others, stops until all earlier ones have used the line.
 ///
@@ -28,6 +30,7 @@ class LineVisits {
     *this = {};
     comes_back_ = comes_back;
   }
+  bool comes_back() const { return comes_back_; }
   /// Something of a visit is next; true if that is its first.
   bool enter(Visit visit) {
     if (visit == visit_) return false;
@@ -79,6 +82,7 @@ class LineUses {
  public:
   using Visit = LineVisits::Visit;
 
+  bool comes_back() const { return visits_.comes_back(); }
   /// Whether the first visit since the line came need not stop; it has come if so.
   bool begin(std::uint32_t sectors, unsigned half) {
     const unsigned halves = LineVisits::halves_of(sectors, half);
@@ -124,32 +128,33 @@ class LineUses {
 /// LineVisits at `lt`, where a visit uses the line before the next one is looked at.
 class TimedLineUses {
  public:
-  /// A line comes into the cache with a first look in a cycle, or fills nothing there, so that nothing stops for it.
+  /// A line comes into the cache with a first look in a cycle; nothing stops for it if it fills nothing there.
   void come(Cycle at, bool fills) {
-    came_at_ = fills ? at : 0;
+    came_at_ = at;
+    fills_ = fills;
     is_new_ = true;
   }
   /// Of a second look.
   struct Look {
-    std::uint32_t again = 0;  ///< sectors that were asked for in vain, while an earlier use was to come
+    std::uint32_t again = 0;  ///< sectors that were asked for while an earlier use was to come
     bool is_first = false;    ///< that its visit asks for again
+    bool comes_back = false;  ///< so that it waits for them
   };
   /// What is next of a visit, whose second look may be in cycle `at`, which becomes that in which it is.
   Look look_again(LineVisits::Visit visit, std::uint32_t sectors, unsigned half, Cycle& at) {
     if (std::exchange(is_new_, false)) {
-      const Cycle last = std::max(used_[0], used_[1]);
-      asks_again_ = came_at_ != 0 && last > came_at_;
-      const unsigned halves = LineVisits::halves_of(sectors, half);
+      const unsigned halves = fills_ ? LineVisits::halves_of(sectors, half) : 0;
       const Cycle held = std::max((halves & 1U) != 0 ? used_[0] : 0, (halves & 2U) != 0 ? used_[1] : 0);
-      visits_.begin(asks_again_ && held > at);
-      if (asks_again_) at = std::max(at, held);
+      visits_.begin(held > at);
+      at = std::max(at, held);
+      asked_early_ = fills_ && std::max(used_[0], used_[1]) > came_at_;
     }
     if (visits_.enter(visit)) used_by_earlier_ = std::max(used_[0], used_[1]);
     if (visits_.stops(sectors, half)) at = std::max(at, used_by_earlier_);
     const std::uint32_t lacking = visits_.lacking(sectors);
     if (lacking == 0) return {};
     const bool is_first = visits_.ask(lacking);
-    return {asks_again_ ? lacking : 0, is_first};
+    return {asked_early_ ? lacking : 0, is_first, visits_.comes_back()};
   }
   void used(std::uint32_t sectors, unsigned half, Cycle at) {
     const unsigned halves = LineVisits::halves_of(sectors, half);
@@ -163,7 +168,8 @@ class TimedLineUses {
   Cycle used_by_earlier_ = 0;
   Cycle came_at_ = 0;
   bool is_new_ = false;
-  bool asks_again_ = false;
+  bool fills_ = false;
+  bool asked_early_ = false;
 };
 
 }  // namespace vrpipe

@@ -93,8 +93,9 @@ class CropBehaviour : public Behaviour {
 /// The slot's kinds of work.
 struct CropWork {
   /// Quads blended, sectors that move in its time, what hazards waste of the blender, and quads that have no neighbour to
-  /// go with (pairs_in_sector): parts of a cycle (CropTime). And flits of the port to L2.
-  enum : unsigned { blend, sectors, forwarding, unpaired, flits, kinds };
+  /// go with (pairs_in_sector): parts of a cycle (CropTime). Flits of the port to L2, and those of ZROP's reads, beside which
+  /// nothing is blended.
+  enum : unsigned { blend, sectors, forwarding, unpaired, flits, reads, kinds };
   /// And what is counted for `bound`.
   enum : unsigned { sectors_filled = kinds, lines_filled, bytes_moved };
 };
