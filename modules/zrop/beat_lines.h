@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "block_price.h"
 #include "z_cache.h"
 
 #include <vrpipe/memory/sectors.h>
@@ -24,9 +25,7 @@ class BeatLines {
         places_(sectors_of_quads(cache.organization, DepthStencilSurface::bytes_per_quad(surface.format()))) {
     halves_of_line_.resize(bytes_per_tile_ / line_bytes_);
     for (unsigned position = 0; position < positions_per_tile; ++position) {
-      const unsigned column = position % quads_per_tile_row;
-      const unsigned half = position / (4 * quads_per_tile_row) * 4 + column / 2;
-      halves_of_line_[places_[position].line][half] |= places_[position].sectors;
+      halves_of_line_[places_[position].line][half_of_block(position)] |= places_[position].sectors;
     }
   }
 

@@ -7,6 +7,11 @@
 
 namespace vrpipe {
 
+/// Of a position in a screen tile, from 0: the half, 4x8 pixels, of an 8x8 block in which it lies. Two are a block.
+constexpr unsigned half_of_block(unsigned position) {
+  return position / (4 * quads_per_tile_row) * 4 + position % quads_per_tile_row / 2;
+}
+
 /// What tests take by the places that they touch: so much for each half, 4x8 pixels, of an 8x8 block in which a primitive
 /// has quads, and at least so much for the block (measured on a GH100 graphics GPC: 1 and 1.4 cycles).
 class BlockPrice {
@@ -30,9 +35,8 @@ class BlockPrice {
     std::uint64_t price = 0;
     for (unsigned i = 0; i < count; ++i) {
       const Quad& quad = quads[i];
-      const unsigned column = quad.position % quads_per_tile_row;
-      const unsigned block = quad.position / (4 * quads_per_tile_row) * 2 + column / 4;
-      const unsigned half = 1U << (column / 2 % 2);
+      const unsigned block = half_of_block(quad.position) / 2;
+      const unsigned half = 1U << half_of_block(quad.position) % 2;
       const std::uint32_t primitive = primitive_order(quad);
       if (primitive != last.primitive || block != last.block || tile != last.tile) {
         last = {tile, primitive, block, half};

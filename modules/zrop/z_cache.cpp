@@ -2,17 +2,15 @@
 
 #include <fmt/format.h>
 
+#include "zrop/block_price.h"
+
 #include <vrpipe/component/error.h>
 
 namespace vrpipe {
 
 unsigned halves_of_blocks(const Quad* quads, unsigned count) {
   unsigned halves = 0;  // a bit each
-  for (unsigned i = 0; i < count; ++i) {
-    const unsigned column = quads[i].position % quads_per_tile_row;
-    const unsigned row = quads[i].position / quads_per_tile_row;
-    halves |= 1U << (row / 4 * 4 + column / 2);
-  }
+  for (unsigned i = 0; i < count; ++i) halves |= 1U << half_of_block(quads[i].position);
   return static_cast<unsigned>(__builtin_popcount(halves));
 }
 
