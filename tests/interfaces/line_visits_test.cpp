@@ -81,11 +81,11 @@ struct Look {
 };
 constexpr Cycle trip = 50;
 
-/// Cycles of the second looks, of which there is one a cycle, and what they ask for again. A use follows a trip later.
+/// Cycles of the second looks, of which there is one a cycle, what they ask for again, and of lines that come back, for which
+/// they wait. A use follows a trip later.
 struct Outcome {
   std::vector<Cycle> looks;
-  std::vector<std::uint32_t> again;
-  bool operator==(const Outcome& other) const { return looks == other.looks && again == other.again; }
+  std::vector<std::uint32_t> again, awaited;
 };
 
 Outcome timed(const std::vector<Look>& all) {
@@ -96,7 +96,8 @@ Outcome timed(const std::vector<Look>& all) {
     if (look.comes) line.come(look.first_look, true);
     at = std::max(at, look.first_look + 1);
     const TimedLineUses::Look found = line.look_again(look.visit, look.sectors, half, at);
-    outcome.again.push_back(found.comes_back ? found.again : 0);
+    outcome.again.push_back(found.again);
+    outcome.awaited.push_back(found.comes_back ? found.again : 0);
     outcome.looks.push_back(at);
     line.used(look.sectors, half, at + trip);
     ++at;
@@ -109,6 +110,7 @@ Outcome cycle_by_cycle(const std::vector<Look>& all) {
   LineUses line;
   std::deque<std::pair<Cycle, std::size_t>> uses;
   bool has_come = false;
+  bool asked_early = false;
   for (Cycle now = 0; outcome.looks.size() < all.size(); ++now) {
     const Look& look = all[outcome.looks.size()];
     for (; !uses.empty() && uses.front().first <= now; uses.pop_front()) {
@@ -119,11 +121,13 @@ Outcome cycle_by_cycle(const std::vector<Look>& all) {
     if (look.comes && !has_come) {
       if (!line.begin(look.sectors, half)) continue;
       has_come = true;
+      asked_early = !outcome.looks.empty() && outcome.looks.back() + trip > look.first_look;
     }
     if (!line.may_go(look.visit, look.sectors, half)) continue;
     bool is_first = false;
     const std::uint32_t lacking = line.go(look.sectors, half, is_first);
-    outcome.again.push_back(line.comes_back() ? lacking : 0);
+    outcome.again.push_back(asked_early ? lacking : 0);
+    outcome.awaited.push_back(line.comes_back() ? lacking : 0);
     uses.emplace_back(now + trip, outcome.looks.size());
     outcome.looks.push_back(now);
     has_come = false;
@@ -148,6 +152,7 @@ TEST(TimedLineUses, AreThoseOfCycle) {
     const Outcome found = timed(all);
     ASSERT_EQ(found.looks, expected.looks) << round;
     ASSERT_EQ(found.again, expected.again) << round;
+    ASSERT_EQ(found.awaited, expected.awaited) << round;
     for (std::size_t i = 1; i < all.size(); ++i)
       stops += expected.looks[i] > std::max(expected.looks[i - 1], all[i].first_look) + 1 ? 1U : 0U;
   }
