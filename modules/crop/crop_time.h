@@ -107,9 +107,14 @@ class CropTime {
     done_ += lost;
     return lost;
   }
+  /// The same where nothing is waited for but quads and their sectors.
+  void idle_until(Cycle now) {
+    const std::int64_t from = done_;
+    if (open(now) > 0 && port.is_on()) keep_idle(from);
+  }
   /// It is blended in a cycle in which there is time for it.
   void blend(const Quad& quad, const Price& price, Cycle at) {
-    open(at);
+    idle_until(at);
     std::int64_t parts = price.parts;
     if (in_pairs_) go_with(quad, price.joins);
     if (column_parts_ > 0 && quad.blends) parts += lengthen(quad, at);
@@ -142,7 +147,7 @@ class CropTime {
   }
   std::pair<Cycle, Cycle> blend_all(unsigned quads, Cycle ready) {
     const Cycle first = free_from(price(), ready);
-    open(first);
+    idle_until(first);
     done_ += quads * price_;
     last_blend_ = std::max(first, cycle_of(done_));
     return {first, last_blend_};
@@ -162,10 +167,18 @@ class CropTime {
     done_ += parts;
     return true;
   }
-  /// ZROP reads so many flits through the port: in a cycle for each nothing is blended.
+  /// ZROP reads so many flits through the port, one after the other: in a cycle for each nothing is blended. lt is told late of
+  /// them; then those take nothing in whose cycles the blender was idle. `at` does not go back.
   void rest(unsigned flits, Cycle at) {
-    open(at);
-    done_ += flits * parts_of_a_cycle;
+    idle_until(at);
+    const std::int64_t from = std::max(earliest(at), reads_until_);
+    reads_until_ = from + flits * parts_of_a_cycle;
+    done_ += reads_until_ - from;
+    for (; !idle_.empty() && idle_.front().from < reads_until_; idle_.pop()) {
+      const IdleParts& idle = idle_.front();
+      done_ -= std::max<std::int64_t>(std::min(idle.until, reads_until_) - std::max(idle.from, from), 0);
+      if (idle.until > reads_until_) break;
+    }
   }
   /// From when on no blend of the same pixels is in the pipeline, without forwarding; `now` does not go back.
   Cycle hazard_until(std::size_t place, LaneMask live, Cycle now) {
@@ -211,6 +224,15 @@ class CropTime {
   unsigned looked_up_at_once() const;
 
  private:
+  /// Up to what is done now. Of a read lt is told before the blender is idle for the 64th time since.
+  [[gnu::noinline]] void keep_idle(std::int64_t from) {
+    if (!idle_.empty() && idle_.back().until == from) {
+      idle_.back().until = done_;
+      return;
+    }
+    if (idle_.size() == 64) idle_.pop();
+    idle_.push({from, done_});
+  }
   /// In which parts end, of which there is at least one.
   Cycle cycle_of(std::int64_t parts) const {
     return cycles_.quotient_up(static_cast<std::uint64_t>(std::max<std::int64_t>(parts, 1))) - 1;
@@ -255,6 +277,9 @@ class CropTime {
     Cycle at = 0;
     LaneMask live = 0;
   };
+  struct IdleParts {
+    std::int64_t from = 0, until = 0;
+  };
   struct Idle {
     Cycle at = 0;            ///< of the blend
     std::int64_t parts = 0;  ///< in which nothing moves
@@ -269,16 +294,18 @@ class CropTime {
     std::uint64_t lines = 0;  ///< that it has asked for, a bit each
   };
 
-  std::int64_t price_;         ///< of a quad by its rate
-  std::int64_t sector_price_;  ///< of one that moves
-  std::int64_t column_parts_;  ///< 0: columns have no price
-  bool in_pairs_;              ///< several quads go in a cycle only if they share a sector
-  std::int64_t most_kept_;     ///< of a cycle's parts in the next one
-  Divisor cycles_;             ///< of parts
-  std::int64_t done_ = 0;      ///< parts from the beginning, those that were lost too
-  Ring<Idle> idle_cache_;      ///< by the last blends of several cycles
-  Group group_;                ///< the last quads that go together
-  Group queued_;               ///< of those that were looked up
+  std::int64_t price_;            ///< of a quad by its rate
+  std::int64_t sector_price_;     ///< of one that moves
+  std::int64_t column_parts_;     ///< 0: columns have no price
+  bool in_pairs_;                 ///< several quads go in a cycle only if they share a sector
+  std::int64_t most_kept_;        ///< of a cycle's parts in the next one
+  Divisor cycles_;                ///< of parts
+  std::int64_t done_ = 0;         ///< parts from the beginning, those that were lost too
+  std::int64_t reads_until_ = 0;  ///< parts
+  Ring<IdleParts> idle_;          ///< the last in which the blender did nothing, beside a port
+  Ring<Idle> idle_cache_;         ///< by the last blends of several cycles
+  Group group_;                   ///< the last quads that go together
+  Group queued_;                  ///< of those that were looked up
   Cycle last_blend_ = 0;
   std::int64_t unpaired_ = 0;  ///< parts of the last quads' price beyond their rate's
   std::int64_t settled_ = 0;   ///< and of those before, not tallied yet

@@ -228,7 +228,7 @@ class TimedCrop : public TimedUnit {
     const Cycle free = time_.free_from(time_.price(), there);
     const Cycle until = time_.hazard_until(quad.place, quad.live, time_.last_blend());
     if (until <= free) return there;
-    time_.open(free);
+    time_.idle_until(free);
     did(CropWork::forwarding, static_cast<std::uint64_t>(time_.open(until)), free, until);
     return until;
   }

@@ -152,6 +152,24 @@ TEST(CropTime, AMoveOfWhichItIsToldLateIsBesideTheBlendOfItsTime) {
   EXPECT_FALSE(time.move(1, second));
 }
 
+TEST(CropTime, AReadOfWhichItIsToldLateTakesNothingWhereTheBlenderWasIdle) {
+  const auto next_after = [](unsigned flits, Cycle at) {
+    CropTime time = time_of({{"bytes_per_cycle", "32"}, {"port_flits_per_cycle", "1"}}, ColorFormat::rgba16f);
+    blended(time, quad_of(0), 10);
+    blended(time, quad_of(1), 100);
+    time.rest(flits, at);
+    return blended(time, quad_of(2), 0);
+  };
+  EXPECT_EQ(next_after(0, 0), 101U);
+  EXPECT_EQ(next_after(3, 50), 101U);
+  EXPECT_EQ(next_after(1, 10), 102U) << "beside a blend";
+  EXPECT_EQ(next_after(3, 98), 102U) << "of which one is";
+  CropTime time = time_of({{"bytes_per_cycle", "32"}, {"port_flits_per_cycle", "1"}}, ColorFormat::rgba16f);
+  blended(time, quad_of(0), 100);
+  for (unsigned read = 0; read < 4; ++read) time.rest(50, 20);
+  EXPECT_EQ(blended(time, quad_of(1), 0), 221U) << "time is idle once: 80 of 200 cycles";
+}
+
 TEST(CropTime, WithoutForwardingAQuadWaitsForOneOfTheSamePixels) {
   CropTime time = time_of({{"forwarding", "off"}, {"latency_cycles", "9"}}, ColorFormat::rgba16f);
   CropTime::Quad left = quad_of(0, 3);
