@@ -76,8 +76,7 @@ struct CropParameters : ParameterSet {
                    "a tile's colours are in memory in blocks of 32 bytes by 8 rows, not in Morton order"};
   Switch gob_hazards{*this, "gob_hazards", false, "left open by the paper; measured on a GH100 graphics GPC: on",
                      "without forwarding, pixels in a row of a screen tile wait for one another that have the same "
-                     "place in 64 bytes (the "
-                     "width of a GOB), not only the same pixels"};
+                     "place in 64 bytes (the width of a GOB), not only the same pixels"};
   Integer rgba32f_latency_cycles{*this,
                                  "rgba32f_latency_cycles",
                                  0,

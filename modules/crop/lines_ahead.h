@@ -73,7 +73,7 @@ class LinesAhead {
     State& stay = stays_[number];
     LineUses& uses = uses_[index(stay.address)];
     if (stay.is_new) {
-      if (!uses.begin(stay.fills ? sectors : 0, half_)) return false;
+      if (!uses.begin(stay.fetches_again ? sectors : 0, half_)) return false;
       stay.is_new = false;
     }
     if (!uses.may_go(visit, sectors, half_)) return false;
@@ -140,8 +140,7 @@ class LinesAhead {
     bool left = false;        ///< the line has gone for another
     bool ended = false;
     bool is_new = true;          ///< nothing was looked up twice
-    bool fills = false;          ///< what it began with asked for sectors
-    bool fetches_again = false;  ///< it began before the one before it had ended
+    bool fetches_again = false;  ///< what it began with asked for sectors before the stay before it had ended
     bool waits_again = false;    ///< and comes back
   };
   struct Request {
@@ -168,9 +167,8 @@ class LinesAhead {
     State& stay = stays_[number];
     stay = {};
     stay.address = access.address;
-    stay.fills = access.filled != 0;
     Stay& latest = latest_[index(access.address)];
-    stay.fetches_again = stay.fills && latest != no_stay;
+    stay.fetches_again = access.filled != 0 && latest != no_stay;
     latest = number;
     stay_of_line_[access.line] = number;
   }

@@ -130,8 +130,7 @@ class TimedLineUses {
  public:
   /// A line comes into the cache with a first look in a cycle; nothing stops for it if it fills nothing there.
   void come(Cycle at, bool fills) {
-    came_at_ = at;
-    fills_ = fills;
+    asked_at_ = fills ? at : never;
     is_new_ = true;
   }
   /// Of a second look.
@@ -143,11 +142,11 @@ class TimedLineUses {
   /// What is next of a visit, whose second look may be in cycle `at`, which becomes that in which it is.
   Look look_again(LineVisits::Visit visit, std::uint32_t sectors, unsigned half, Cycle& at) {
     if (std::exchange(is_new_, false)) {
-      const unsigned halves = fills_ ? LineVisits::halves_of(sectors, half) : 0;
+      asked_early_ = std::max(used_[0], used_[1]) > asked_at_;
+      const unsigned halves = asked_early_ ? LineVisits::halves_of(sectors, half) : 0;
       const Cycle held = std::max((halves & 1U) != 0 ? used_[0] : 0, (halves & 2U) != 0 ? used_[1] : 0);
       visits_.begin(held > at);
       at = std::max(at, held);
-      asked_early_ = fills_ && std::max(used_[0], used_[1]) > came_at_;
     }
     if (visits_.enter(visit)) used_by_earlier_ = std::max(used_[0], used_[1]);
     if (visits_.stops(sectors, half)) at = std::max(at, used_by_earlier_);
@@ -166,9 +165,8 @@ class TimedLineUses {
   LineVisits visits_;
   std::array<Cycle, 2> used_{};  ///< last, by half
   Cycle used_by_earlier_ = 0;
-  Cycle came_at_ = 0;
+  Cycle asked_at_ = 0;
   bool is_new_ = false;
-  bool fills_ = false;
   bool asked_early_ = false;
 };
 
