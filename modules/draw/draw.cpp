@@ -11,7 +11,11 @@
 namespace vrpipe {
 
 VertexIssue::VertexIssue(const Parameters& parameters, const RenderContext& context)
-    : frame_(*context.frame), rate_(parameters.warps_per_1024_cycles * context.placement.gpcs) {}
+    : frame_(*context.frame),
+      rate_(parameters.warps_per_1024_cycles * context.placement.gpcs),
+      rate_of_rectangles_(parameters.rectangle_warps_per_1024_cycles > 0
+                              ? parameters.rectangle_warps_per_1024_cycles * context.placement.gpcs
+                              : rate_) {}
 
 /// Vertices fill warps; where those of a rectangle lie in two, it goes with the second.
 std::uint32_t VertexIssue::splats_that_fit(const DrawCall& call) const {

@@ -1,6 +1,7 @@
 #include "draw/issue_schedule.h"
 
 #include <vrpipe/model/timed.h>
+#include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/slots/draw.h>
 
 namespace vrpipe {
@@ -14,7 +15,7 @@ class TimedDraw : public TimedUnit {
             const RenderContext& context, unsigned gpcs)
       : TimedUnit(name, domain, DrawWork::kinds()),
         behaviour_(std::move(behaviour)),
-        schedule_(behaviour_->warps_per_1024_cycles()),
+        schedule_(*behaviour_, context),
         barriers_(context) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       outs_.push_back(std::make_unique<TimedOut<VertexWarp>>(*this, "out_vertices_" + std::to_string(gpc)));
@@ -25,13 +26,17 @@ class TimedDraw : public TimedUnit {
       in_done_.back()->set_optional();
       in_done_.back()->set_comes_ahead();
     }
-    have_ = behaviour_->next(warp_);
+    fetch();
   }
 
   bool idle() const override { return ended_ == outs_.size(); }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
+  void fetch() {
+    have_ = behaviour_->next(warp_);
+    if (have_ && warp_.mark == Mark::none) schedule_.turn_to(warp_);
+  }
   Cycle due() const { return have_ && warp_.mark == Mark::none ? schedule_.due() : 0; }
 
   Cycle take_done(Cycle visible) {
@@ -61,7 +66,7 @@ class TimedDraw : public TimedUnit {
         const Cycle interval = schedule_.issue();
         if (interval > 0) did(DrawWork::warps, interval, taken, taken + interval);
       }
-      have_ = behaviour_->next(warp_);
+      fetch();
     } else {
       ++ended_;
     }

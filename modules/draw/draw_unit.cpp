@@ -1,6 +1,7 @@
 #include "draw/issue_schedule.h"
 
 #include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/slots/draw.h>
 
 namespace vrpipe {
@@ -15,7 +16,7 @@ class DrawUnit : public Unit {
            const RenderContext& context, unsigned gpcs)
       : Unit(name, domain, DrawWork::kinds()),
         behaviour_(std::move(behaviour)),
-        schedule_(behaviour_->warps_per_1024_cycles()),
+        schedule_(*behaviour_, context),
         barriers_(context) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       outs_.push_back(std::make_unique<StreamOut<VertexWarp>>(*this, "out_vertices_" + std::to_string(gpc)));
@@ -23,13 +24,17 @@ class DrawUnit : public Unit {
       in_done_.back()->set_optional();
       in_done_.back()->set_answers();
     }
-    have_ = behaviour_->next(warp_);
+    fetch();
   }
 
   bool idle() const override { return ended_ == outs_.size(); }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
+  void fetch() {
+    have_ = behaviour_->next(warp_);
+    if (have_ && warp_.mark == Mark::none) schedule_.turn_to(warp_);
+  }
   [[gnu::noinline]] void take_done(Cycle now) {
     for (const auto& in : in_done_) {
       for (; in->ready(); in->pop()) --awaited_;
@@ -68,7 +73,7 @@ class DrawUnit : public Unit {
       } else if (barriers_.is_barrier(warp_.mark)) {
         awaited_ = static_cast<unsigned>(outs_.size());
       }
-      have_ = behaviour_->next(warp_);
+      fetch();
     } else {
       VertexWarp end;
       end.mark = Mark::end_of_frame;

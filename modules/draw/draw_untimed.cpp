@@ -1,3 +1,5 @@
+#include "draw/issue_schedule.h"
+
 #include <vrpipe/model/untimed.h>
 #include <vrpipe/pipeline/slots/draw.h>
 
@@ -8,9 +10,9 @@ namespace {
 /// DRAW without time. Ports as in draw_unit.cpp.
 class UntimedDraw : public UntimedUnit {
  public:
-  UntimedDraw(const std::string& name, std::unique_ptr<DrawBehaviour> behaviour, unsigned gpcs)
-      : UntimedUnit(name, {{"warps", 0, 1024.0 / behaviour->warps_per_1024_cycles(), true}}),
-        behaviour_(std::move(behaviour)) {
+  UntimedDraw(const std::string& name, std::unique_ptr<DrawBehaviour> behaviour, const RenderContext& context,
+              unsigned gpcs)
+      : UntimedUnit(name, DrawWork::kinds()), behaviour_(std::move(behaviour)), schedule_(*behaviour_, context) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       outs_.push_back(std::make_unique<UntimedOut<VertexWarp>>(*this, "out_vertices_" + std::to_string(gpc)));
       // Here all that a warp leads to is done before the next.
@@ -24,7 +26,10 @@ class UntimedDraw : public UntimedUnit {
   bool run_piece() override {
     VertexWarp warp;
     if (behaviour_->next(warp)) {
-      if (warp.mark == Mark::none) did(DrawWork::warps, 1);
+      if (warp.mark == Mark::none) {
+        schedule_.turn_to(warp);
+        did(DrawWork::warps, schedule_.issue());
+      }
       outs_[turn_]->send(warp);
       turn_ = turn_ + 1 == outs_.size() ? 0 : turn_ + 1;
       return true;
@@ -37,6 +42,7 @@ class UntimedDraw : public UntimedUnit {
 
  private:
   std::unique_ptr<DrawBehaviour> behaviour_;
+  IssueSchedule schedule_;
   std::vector<std::unique_ptr<UntimedOut<VertexWarp>>> outs_;
   std::vector<std::unique_ptr<UntimedIn<BlendsDone>>> in_done_;
   std::size_t turn_ = 0;
@@ -44,8 +50,8 @@ class UntimedDraw : public UntimedUnit {
 
 [[maybe_unused]] const bool draw_untimed_registered = [] {
   register_untimed_unit_maker("draw", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                         const RenderContext&, unsigned gpcs) {
-    return std::make_unique<UntimedDraw>(name, behaviour_as<DrawBehaviour>(std::move(behaviour)), gpcs);
+                                         const RenderContext& context, unsigned gpcs) {
+    return std::make_unique<UntimedDraw>(name, behaviour_as<DrawBehaviour>(std::move(behaviour)), context, gpcs);
   });
   return true;
 }();

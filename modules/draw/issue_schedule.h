@@ -4,7 +4,9 @@
 #include <cstdint>
 
 #include <vrpipe/kernel/accounting.h>
-#include <vrpipe/pipeline/barrier_plan.h>
+#include <vrpipe/pipeline/geometry.h>
+#include <vrpipe/pipeline/render_context.h>
+#include <vrpipe/pipeline/slots/draw.h>
 
 namespace vrpipe {
 
@@ -12,8 +14,20 @@ namespace vrpipe {
 /// nothing can be fetched ahead, and the rate begins anew.
 class IssueSchedule {
  public:
-  explicit IssueSchedule(std::uint32_t warps_per_1024_cycles) : rate_(warps_per_1024_cycles) {}
-  /// The next warp.
+  IssueSchedule(const DrawBehaviour& behaviour, const RenderContext& context)
+      : context_(context),
+        rate_of_warps_(behaviour.warps_per_1024_cycles()),
+        rate_of_rectangles_(behaviour.rectangle_warps_per_1024_cycles()),
+        rate_(rate_of_warps_) {}
+  /// It is the turn of a warp, which is no mark.
+  void turn_to(const VertexWarp& warp) {
+    const std::uint32_t rate = draws_rectangles(context_.draw(warp.draw)) ? rate_of_rectangles_ : rate_of_warps_;
+    if (rate == rate_) return;
+    begin_ = due();
+    issued_ = 0;
+    rate_ = rate;
+  }
+  /// That warp.
   Cycle due() const { return due(issued_); }
   /// It is issued; returns the cycles from its turn to that of the one after it.
   Cycle issue() {
@@ -28,7 +42,10 @@ class IssueSchedule {
  private:
   Cycle due(std::uint64_t warp) const { return begin_ + warp * 1024 / rate_; }
 
-  const std::uint32_t rate_;
+  const RenderContext& context_;
+  const std::uint32_t rate_of_warps_;
+  const std::uint32_t rate_of_rectangles_;
+  std::uint32_t rate_;
   Cycle begin_ = 0;
   std::uint64_t issued_ = 0;  ///< since then
 };

@@ -7,6 +7,7 @@
 
 #include "l2/own_clock.h"
 
+#include <vrpipe/component/error.h>
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/memory/memory_port.h>
 #include <vrpipe/model/memory_unit.h>
@@ -36,22 +37,37 @@ class FixedLatency final : public MemoryBehaviour {
                                  "cycles",
                                  "left open by the paper; measured on a GH100 graphics GPC: 43",
                                  "that CROP's accesses take more than others"};
+    Integer slice_spread_cycles{
+        *this,
+        "slice_spread_cycles",
+        0,
+        0,
+        100000,
+        "cycles",
+        "left open by the paper; measured on a GH100 graphics GPC: 17",
+        "that a quarter of the near slices, and of the others, takes less than their mean, and a quarter more"};
     Integer bytes_per_cycle{*this, "bytes_per_cycle", 128,          32,
                             4096,  "bytes",           source::open, "moved for each GPC: four sectors"};
     OwnClock::Parameter frequency_mhz{*this};
   };
+  /// Throws UserError where the spread leaves no latency.
   FixedLatency(const Parameters& parameters, const RenderContext& context)
       : clock_("l2", parameters.frequency_mhz, context),
         latency_{parameters.latency_cycles,
                  parameters.near_latency_cycles > 0 ? parameters.near_latency_cycles : parameters.latency_cycles,
-                 parameters.color_latency_cycles},
-        bytes_per_cycle_(parameters.bytes_per_cycle) {}
+                 parameters.color_latency_cycles, parameters.slice_spread_cycles},
+        bytes_per_cycle_(parameters.bytes_per_cycle) {
+    const std::uint32_t nearest = std::min(latency_.near, latency_.far);
+    if (latency_.spread < nearest) return;
+    throw UserError("unusable L2", "l2.slice_spread_cycles",
+                    "the nearest slices would take " + std::to_string(latency_.spread) + " cycles less than " +
+                        std::to_string(nearest),
+                    "use less than their latency");
+  }
 
   void access(const MemoryRequest&) override {}
   bool follows_accesses() const override { return false; }
-  TimingParameters timing() const override {
-    return clock_.of_units({std::min(latency_.near, latency_.far), bytes_per_cycle_});
-  }
+  TimingParameters timing() const override { return clock_.of_units({latency_.least(), bytes_per_cycle_}); }
   /// In cycles of its clock, as `bytes_per_cycle`.
   const MemoryLatency& latency() const { return latency_; }
   std::uint32_t bytes_per_cycle() const { return bytes_per_cycle_; }

@@ -44,6 +44,15 @@ struct RasterParameters : ParameterSet {
                                   "left open by the paper; measured on a GH100 graphics GPC: at most 2.9",
                                   "the same of a primitive of which fragments read no attributes, as where nothing is "
                                   "shaded; 0: setup_interval_cycles"};
+  Real rectangle_setup_interval_cycles{
+      *this,
+      "rectangle_setup_interval_cycles",
+      0,
+      0,
+      1000,
+      "cycles",
+      "left open by the paper; measured on a GH100 graphics GPC: 4.17",
+      "the same of a filled rectangle of which fragments read attributes; 0: setup_interval_cycles"};
   Integer coarse_tiles_per_cycle{*this,
                                  "coarse_tiles_per_cycle",
                                  8,
@@ -87,6 +96,9 @@ struct RasterTime {
         bare_setup_interval_thousandths(parameters.bare_setup_interval_cycles > 0
                                             ? parameters.bare_setup_interval_cycles.thousandths()
                                             : setup_interval_thousandths),
+        rectangle_setup_interval_thousandths(parameters.rectangle_setup_interval_cycles > 0
+                                                 ? parameters.rectangle_setup_interval_cycles.thousandths()
+                                                 : setup_interval_thousandths),
         coarse_tiles_per_cycle(parameters.coarse_tiles_per_cycle),
         fine_tiles_per_cycle(parameters.fine_tiles_per_cycle),
         screen_tile_interval_thousandths(parameters.screen_tile_interval_cycles.thousandths()),
@@ -94,12 +106,13 @@ struct RasterTime {
         context_(context) {}
 
   const std::uint32_t setup_latency_cycles;
-  const std::uint32_t setup_interval_thousandths;        ///< of a cycle, between primitives
-  const std::uint32_t bare_setup_interval_thousandths;   ///< the same without attributes
-  const std::uint32_t coarse_tiles_per_cycle;            ///< raster tiles tested
-  const std::uint32_t fine_tiles_per_cycle;              ///< raster tiles made into quads
-  const std::uint32_t screen_tile_interval_thousandths;  ///< of a cycle, between (primitive, screen tile) pairs
-  const std::uint32_t quads_per_cycle;                   ///< handed to TC
+  const std::uint32_t setup_interval_thousandths;            ///< of a cycle, between primitives
+  const std::uint32_t bare_setup_interval_thousandths;       ///< the same without attributes
+  const std::uint32_t rectangle_setup_interval_thousandths;  ///< and between rectangles
+  const std::uint32_t coarse_tiles_per_cycle;                ///< raster tiles tested
+  const std::uint32_t fine_tiles_per_cycle;                  ///< raster tiles made into quads
+  const std::uint32_t screen_tile_interval_thousandths;      ///< of a cycle, between (primitive, screen tile) pairs
+  const std::uint32_t quads_per_cycle;                       ///< handed to TC
 
   /// What the set-up of a draw's primitive takes.
   struct SetUp {
@@ -107,8 +120,10 @@ struct RasterTime {
     std::uint32_t thousandths;
   };
   SetUp set_up(DrawIndex draw) const {
-    if (reads_attributes(context_.state(draw).shader)) return {RasterWork::setup, setup_interval_thousandths};
-    return {RasterWork::bare_setup, bare_setup_interval_thousandths};
+    const DrawCall& call = context_.draw(draw);
+    if (!reads_attributes(call.state.shader)) return {RasterWork::bare_setup, bare_setup_interval_thousandths};
+    if (draws_rectangles(call)) return {RasterWork::rectangle_setup, rectangle_setup_interval_thousandths};
+    return {RasterWork::setup, setup_interval_thousandths};
   }
 
   /// Of beats of quads.
@@ -120,7 +135,8 @@ struct RasterTime {
             {"fine tiles", 2, 1.0 / fine_tiles_per_cycle, false},
             {"screen tiles", 3, screen_tile_interval_thousandths / 1000.0, false},
             {"quads", 4, 1.0 / quads_per_cycle, true},
-            {"bare set-up", 0, bare_setup_interval_thousandths / 1000.0, false}};
+            {"bare set-up", 0, bare_setup_interval_thousandths / 1000.0, false},
+            {"set-up of rectangles", 0, rectangle_setup_interval_thousandths / 1000.0, false}};
   }
 
  private:

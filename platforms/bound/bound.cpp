@@ -174,8 +174,9 @@ std::vector<OccupancyPart> PhaseBound::parts_of(Pipeline::Place place, const Wor
   Work::Items items = done.of[place];
   switch (place) {
     case Pipeline::tgc:
-      items[TgcWork::primitives] =
-          done.of[Pipeline::raster][RasterWork::setup] + done.of[Pipeline::raster][RasterWork::bare_setup];
+      items[TgcWork::primitives] = 0;
+      for (const unsigned kind : {RasterWork::setup, RasterWork::bare_setup, RasterWork::rectangle_setup})
+        items[TgcWork::primitives] += done.of[Pipeline::raster][kind];
       break;
     case Pipeline::tc: items[TcWork::quads] = collected(done); break;
     case Pipeline::prop:

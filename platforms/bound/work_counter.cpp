@@ -184,7 +184,7 @@ void WorkCounter::count_front_end() {
   count(Pipeline::draw, DrawWork::warps);
   count(Pipeline::vpo, VpoWork::triangles);
   count(Pipeline::tgc, TgcWork::entries);
-  for (unsigned kind = RasterWork::setup; kind <= RasterWork::bare_setup; ++kind) count(Pipeline::raster, kind);
+  for (unsigned kind = RasterWork::setup; kind <= RasterWork::rectangle_setup; ++kind) count(Pipeline::raster, kind);
   count(Pipeline::sm, SmWork::vertex);
   UntimedUnit* const sm = unit(Pipeline::sm);
   if (sm != nullptr && sm->memory_port() != nullptr) {

@@ -88,6 +88,25 @@ TEST_P(DrawMarksTest, AMarkWaitsForNoIntervalAndPutsOffNoWarp) {
   EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), DrawWork::warps, 10'000), 3 * 128) << "marks occupy nothing";
 }
 
+TEST_P(DrawMarksTest, WarpsOfFilledRectanglesGoAtARateOfTheirOwn) {
+  DrawState rectangles;
+  rectangles.splat_extent = SplatExtent::fill_rectangle;
+  Frame frame(16, 16);
+  frame.draw(splats(16), {});
+  frame.draw(splats(20), rectangles);  // ten of three vertices a warp
+  frame.draw(splats(8), {});
+  Bench bench(GetParam(), "draw", "vertex-issue", context_of(frame),
+              {{"warps_per_1024_cycles", "8"}, {"rectangle_warps_per_1024_cycles", "16"}});
+  Sink<VertexWarp>& warps = bench.sink<VertexWarp>("out_vertices_0");
+  bench.run();
+  Words words;
+  for (const auto& record : warps.records()) words.push_back(words_of(record.item));
+  EXPECT_EQ(words, (Words{"draw 0: 0 to 7", "draw 0: 8 to 15", "mark 1", "draw 1: 16 to 25", "draw 1: 26 to 35",
+                          "mark 2", "draw 2: 36 to 43", "end"}));
+  EXPECT_EQ(testing::cycles_of(warps), (std::vector<Cycle>{1, 129, 130, 257, 321, 322, 385, 386}));
+  EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), DrawWork::warps, 10'000), 3 * 128 + 2 * 64);
+}
+
 TEST_P(DrawMarksTest, AMarkTakesItsTurnAmongTheGpcsAndEachGetsAnEnd) {
   Frame frame(16, 16);
   frame.draw(splats(16), {});

@@ -16,10 +16,12 @@ rc::Gen<Setting> setting() {
     std::vector<const char*> values;
   };
   static const std::vector<Choice> choices{{"draw", "warps_per_1024_cycles", {"1", "8", "1024"}},
+                                           {"draw", "rectangle_warps_per_1024_cycles", {"1", "8", "1024"}},
                                            {"vpo", "triangles_per_cycle", {"1", "16"}},
                                            {"tgc", "entries_per_cycle", {"1", "8"}},
                                            {"raster", "setup_interval_cycles", {"0.25", "2.7", "7", "1000"}},
                                            {"raster", "bare_setup_interval_cycles", {"0.25", "7", "1000"}},
+                                           {"raster", "rectangle_setup_interval_cycles", {"0.25", "7", "1000"}},
                                            {"raster", "screen_tile_interval_cycles", {"0.5", "6", "1000"}},
                                            {"raster", "coarse_tiles_per_cycle", {"1", "64"}},
                                            {"raster", "quads_per_cycle", {"1", "3"}},

@@ -96,6 +96,30 @@ TEST_P(RasterTimedTest, SetUpsComeAtTheirInterval) {
   EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), RasterWork::setup), 8 * 7);
 }
 
+TEST_P(RasterTimedTest, SetUpsOfFilledRectanglesHaveAnIntervalOfTheirOwn) {
+  for (int i = 0; i < 8; ++i) draw.splats.push_back(testing::flat_box(4, 6, 6, 8, 0.5F));
+  context = testing::context_of(draw);
+  testing::change_state(context, [](DrawState& state) { state.splat_extent = SplatExtent::fill_rectangle; });
+  for (const FragmentShader shader : {FragmentShader::splat, FragmentShader::none}) {
+    testing::change_state(context, [&](DrawState& state) { state.shader = shader; });
+    for (const char* of_rectangles : {"5", "0"}) {
+      Bench bench(GetParam(), "raster", "tile-rasterizer", context,
+                  {{"setup_interval_cycles", "7"},
+                   {"bare_setup_interval_cycles", "3"},
+                   {"rectangle_setup_interval_cycles", of_rectangles}});
+      Source<RasterJob>& in = bench.source<RasterJob>("in_jobs", 16);
+      Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 16);
+      for (const RasterJob& job : jobs()) in.add(job);
+      bench.run();
+      const unsigned interval = shader == FragmentShader::none ? 3 : *of_rectangles == '0' ? 7 : 5;
+      ASSERT_EQ(out.records().size(), 8U);
+      for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(out.records()[i].cycle, out.records()[0].cycle + interval * i);
+      EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), RasterWork::rectangle_setup),
+                       shader == FragmentShader::none ? 0 : 8 * interval);
+    }
+  }
+}
+
 TEST_P(RasterTimedTest, SetUpsWithoutAttributesHaveAnIntervalOfTheirOwn) {
   for (int i = 0; i < 8; ++i) add_one_quad(4);
   for (const FragmentShader shader : {FragmentShader::none, FragmentShader::alpha_threshold, FragmentShader::splat}) {

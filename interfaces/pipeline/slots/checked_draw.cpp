@@ -52,7 +52,16 @@ class CheckedDraw final : public CheckedSlot<DrawBehaviour> {
     check_rate("warps_per_1024_cycles", rate);
     return rate;
   }
-  void check_timing() const override { warps_per_1024_cycles(); }
+  std::uint32_t rectangle_warps_per_1024_cycles() const override {
+    const std::uint32_t rate =
+        ask("rectangle_warps_per_1024_cycles", [&] { return checked_->rectangle_warps_per_1024_cycles(); });
+    check_rate("rectangle_warps_per_1024_cycles", rate);
+    return rate;
+  }
+  void check_timing() const override {
+    warps_per_1024_cycles();
+    rectangle_warps_per_1024_cycles();
+  }
   void check_counters() const override {}
 
  private:

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <deque>
+#include <initializer_list>
 #include <memory>
 #include <vector>
 
@@ -169,23 +171,42 @@ enum class MemoryBelow : std::uint8_t {
 class AnnotatedFills;
 class ClockedFills;
 
-/// From request to data, in cycles.
+/// From request to data, in cycles. An L2 has slices near by and others, and of either some that are nearer still and some that
+/// are farther: an address is of the slice that parities of its bits say.
 struct MemoryLatency {
   // NOLINTNEXTLINE(google-explicit-constructor): the same for all
   MemoryLatency(std::uint32_t cycles) : far(cycles), near(cycles) {}
-  MemoryLatency(std::uint32_t far_cycles, std::uint32_t near_cycles, std::uint32_t more_of_color)
-      : far(far_cycles), near(near_cycles), color(more_of_color) {}
+  /// `slice_spread`: below the others.
+  MemoryLatency(std::uint32_t far_cycles, std::uint32_t near_cycles, std::uint32_t more_of_color,
+                std::uint32_t slice_spread)
+      : far(far_cycles), near(near_cycles), color(more_of_color), spread(slice_spread) {}
   std::uint32_t far;
-  std::uint32_t near;       ///< of the other half of the addresses
-  std::uint32_t color = 0;  ///< CROP's accesses, on top
+  std::uint32_t near;        ///< of the other half of the addresses
+  std::uint32_t color = 0;   ///< CROP's accesses, on top
+  std::uint32_t spread = 0;  ///< that a quarter of either half takes less, and a quarter more
   std::uint32_t of(const MemoryRequest& request) const {
     const std::uint32_t more = request.origin.traffic == MemoryTraffic::color ? color : 0;
-    return (is_near(request.address) ? near : far) + more;
+    const std::uint32_t mean = (is_near(request.address) ? near : far) + more;
+    return spread == 0 ? mean : mean + static_cast<std::uint32_t>(steps_of(request.address)) * spread;
   }
-  /// An L2 has slices near by and others, chosen by parities of the address: among tiles of 1 KB in a row by bits 1, 4 and 8 of
-  /// their number (measured on a GH100 graphics GPC, all 1024 of them).
-  static bool is_near(std::uint64_t address) {
-    return __builtin_parityll(address & (1U << 11U | 1U << 14U | 1U << 18U)) != 0;
+  /// The least of all.
+  std::uint32_t least() const { return std::min(near, far) - spread; }
+  /// Of tiles of 1 KB in a row, by bits of their number (measured on a GH100 graphics GPC, all 1024 of them).
+  static bool is_near(std::uint64_t address) { return parity(address, {1, 4, 8}) != 0; }
+
+ private:
+  /// -1, 0 or 1: how its slice lies to the mean of its half. Says three quarters of the variance of those tiles.
+  static int steps_of(std::uint64_t address) {
+    constexpr std::array<int, 8> steps{0, -1, 1, 0, -1, 0, 0, -1};
+    const int step =
+        steps[parity(address, {2, 7}) | parity(address, {0, 8}) << 1U | parity(address, {1, 4, 8, 9}) << 2U];
+    return parity(address, {4, 6, 8}) != 0 ? -step : step;
+  }
+  /// Of some bits of the number of its tile.
+  static unsigned parity(std::uint64_t address, std::initializer_list<unsigned> bits) {
+    std::uint64_t mask = 0;
+    for (const unsigned bit : bits) mask |= std::uint64_t{1} << (10 + bit);
+    return static_cast<unsigned>(__builtin_parityll(address & mask));
   }
 };
 

@@ -18,6 +18,8 @@ class DrawBehaviour : public Behaviour {
   virtual bool next(VertexWarp& out) = 0;
   /// Vertex warps in 1024 cycles.
   virtual std::uint32_t warps_per_1024_cycles() const = 0;
+  /// The same of warps of filled rectangles.
+  virtual std::uint32_t rectangle_warps_per_1024_cycles() const { return warps_per_1024_cycles(); }
 };
 
 /// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.

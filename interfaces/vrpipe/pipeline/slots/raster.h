@@ -45,7 +45,7 @@ class RasterBehaviour : public Behaviour {
 
 /// The slot's kinds of work.
 struct RasterWork {
-  enum : unsigned { setup, coarse, fine, pairs, quads, bare_setup };
+  enum : unsigned { setup, coarse, fine, pairs, quads, bare_setup, rectangle_setup };
 };
 
 /// The slot's SlotCheck.
