@@ -1,6 +1,6 @@
-#include "draw/issue_schedule.h"
-
 #include <vrpipe/model/untimed.h>
+#include <vrpipe/pipeline/geometry.h>
+#include <vrpipe/pipeline/render_context.h>
 #include <vrpipe/pipeline/slots/draw.h>
 
 namespace vrpipe {
@@ -12,7 +12,10 @@ class UntimedDraw : public UntimedUnit {
  public:
   UntimedDraw(const std::string& name, std::unique_ptr<DrawBehaviour> behaviour, const RenderContext& context,
               unsigned gpcs)
-      : UntimedUnit(name, DrawWork::kinds()), behaviour_(std::move(behaviour)), schedule_(*behaviour_, context) {
+      : UntimedUnit(name, {{"warps", 0, 1024.0 / behaviour->warps_per_1024_cycles(), true},
+                           {"warps of rectangles", 0, 1024.0 / behaviour->rectangle_warps_per_1024_cycles(), true}}),
+        context_(context),
+        behaviour_(std::move(behaviour)) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       outs_.push_back(std::make_unique<UntimedOut<VertexWarp>>(*this, "out_vertices_" + std::to_string(gpc)));
       // Here all that a warp leads to is done before the next.
@@ -26,10 +29,8 @@ class UntimedDraw : public UntimedUnit {
   bool run_piece() override {
     VertexWarp warp;
     if (behaviour_->next(warp)) {
-      if (warp.mark == Mark::none) {
-        schedule_.turn_to(warp);
-        did(DrawWork::warps, schedule_.issue());
-      }
+      if (warp.mark == Mark::none)
+        did(draws_rectangles(context_.draw(warp.draw)) ? DrawWork::rectangle_warps : DrawWork::warps, 1);
       outs_[turn_]->send(warp);
       turn_ = turn_ + 1 == outs_.size() ? 0 : turn_ + 1;
       return true;
@@ -41,8 +42,8 @@ class UntimedDraw : public UntimedUnit {
   }
 
  private:
+  const RenderContext& context_;
   std::unique_ptr<DrawBehaviour> behaviour_;
-  IssueSchedule schedule_;
   std::vector<std::unique_ptr<UntimedOut<VertexWarp>>> outs_;
   std::vector<std::unique_ptr<UntimedIn<BlendsDone>>> in_done_;
   std::size_t turn_ = 0;

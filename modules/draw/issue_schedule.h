@@ -23,7 +23,7 @@ class IssueSchedule {
   void turn_to(const VertexWarp& warp) {
     const std::uint32_t rate = draws_rectangles(context_.draw(warp.draw)) ? rate_of_rectangles_ : rate_of_warps_;
     if (rate == rate_) return;
-    begin_ = due();
+    begin_ += (issued_ * 1024 + rate_ - 1) / rate_;  // all of the turn of the last one
     issued_ = 0;
     rate_ = rate;
   }

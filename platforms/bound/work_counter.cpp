@@ -182,6 +182,7 @@ void WorkCounter::count(Pipeline::Place place, unsigned kind) {
 void WorkCounter::count_front_end() {
   Work& work = bound_.work;
   count(Pipeline::draw, DrawWork::warps);
+  count(Pipeline::draw, DrawWork::rectangle_warps);
   count(Pipeline::vpo, VpoWork::triangles);
   count(Pipeline::tgc, TgcWork::entries);
   for (unsigned kind = RasterWork::setup; kind <= RasterWork::rectangle_setup; ++kind) count(Pipeline::raster, kind);

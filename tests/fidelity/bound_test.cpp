@@ -62,6 +62,24 @@ TEST(Bound, WaitsForNoIntervalOfTheLastVertexWarp) {
   EXPECT_LE(share_of_cycle(request, draw), 1);
 }
 
+// Splats and filled rectangles in turn, whose warps are due at rates that are no whole numbers of cycles.
+TEST(Bound, KnowsTheRateOfFilledRectangles) {
+  DrawState rectangles;
+  rectangles.splat_extent = SplatExtent::fill_rectangle;
+  Frame frame(8, 8);
+  for (unsigned pair = 0; pair < 20; ++pair) {
+    for (const DrawState& state : {DrawState(), rectangles})
+      frame.draw(geometry_of(8, 8, std::vector<Splat>(24, flat_box(0, 0, 8, 8, 0.05F))), state);
+  }
+  for (const char* rate : {"3", "7", "300"}) {
+    const double share = share_of_cycle(with("baseline", {{"draw", "warps_per_1024_cycles", "5"},
+                                                          {"draw", "rectangle_warps_per_1024_cycles", rate}}),
+                                        frame);
+    EXPECT_LE(share, 1) << rate;
+    EXPECT_GT(share, 0.9) << rate << ": all but what nobody waits for at the end of a draw";
+  }
+}
+
 // Merged with quads of the next primitive, a primitive's would come to the SMs in several visits.
 // Updates of the last phase come while ZROP is still at the blocks of the one before it.
 TEST(Bound, UpdatesHideBesideTestsOfEarlierPhases) {

@@ -22,9 +22,10 @@ class DrawBehaviour : public Behaviour {
   virtual std::uint32_t rectangle_warps_per_1024_cycles() const { return warps_per_1024_cycles(); }
 };
 
-/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
+/// The slot's kinds of work, and what they cost by the unit's own words. With time they are cycles between a warp and the next, of
+/// one kind; without, warps.
 struct DrawWork {
-  enum : unsigned { warps };  ///< in cycles between a warp and the next
+  enum : unsigned { warps, rectangle_warps };
   static std::vector<WorkKind> kinds();
 };
 
