@@ -237,7 +237,8 @@ class TimedProp : public TimedUnit {
   /// not wait for that.
   void pass_over(const ReorderBuffer::Waiting& empty) {
     passed_over_ = std::max({empty.from, passed_over_ + 1, out_late_.last()});
-    if (color_.taken_of(passed_over_) == 0) did(PropWork::empty_warps, time_.color_rate.items, passed_over_);
+    if (passed_over_ >= color_.next() && color_.taken_of(passed_over_) == 0)
+      did(PropWork::empty_warps, time_.color_rate.items, passed_over_);
     const WarpRelease release{empty.warp->slot};
     empty.warp->release();
     order_.leave(empty.turn, passed_over_);

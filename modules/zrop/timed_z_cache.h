@@ -98,6 +98,14 @@ class TimedZCache {
       const BeatLines::Needed::Line& changed = needed_.lines[i];
       LineAccess access;
       access.line = cache_->find(changed.address);
+      if (access.line == SectoredCache::no_line && timing_.fetches_ahead()) {
+        access.old_address = changed.address;
+        access.written_back = changed.sectors;
+        cache_->count_written_back(changed.sectors);
+        write_back(access, at);
+        owe(at);
+        continue;
+      }
       if (access.line == SectoredCache::no_line) {
         // It went when another line of the same beat came, which may still be held fast.
         if (pins_lines_) at = pins_.line_free_from(*cache_, changed.address, at);

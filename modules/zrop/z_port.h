@@ -326,9 +326,12 @@ class ZPort {
     for (; !changed_.empty(); changed_.pop()) {
       const BeatLines::Needed::Line& line = changed_.front();
       const bool is_held = port_.cache().find(line.address) != SectoredCache::no_line;
-      if (!port_.put(line.address, line.sectors, moves())) break;
+      const bool is_past = !is_held && ahead_;
+      if (is_past ? !port_.write_past(line.address, line.sectors, moves())
+                  : !port_.put(line.address, line.sectors, moves()))
+        break;
       // What went in the meantime is accessed anew.
-      if (!is_held) count_accesses(static_cast<unsigned>(__builtin_popcount(line.sectors)));
+      if (!is_held && !is_past) count_accesses(static_cast<unsigned>(__builtin_popcount(line.sectors)));
       any = true;
     }
     return any;

@@ -6,6 +6,7 @@
 
 #include <vrpipe/platforms/foreign_memory.h>
 #include <vrpipe/platforms/wiring.h>
+#include <vrpipe/workloads/microbench.h>
 #include <vrpipe/workloads/scene.h>
 
 #include "support/fidelities.h"
@@ -321,6 +322,21 @@ TEST(DepthStencilTraffic, TagsAreLookedAtAsFarAheadAtLtAsAtCycle) {
     reads[fidelity] = static_cast<double>(statistic(run(request, frame), "l2.depth_stencil_reads"));
   }
   EXPECT_NEAR(reads[Fidelity::lt], reads[Fidelity::cycle], 0.03 * reads[Fidelity::cycle]);
+}
+
+// More tiles in turn than the z-cache has lines: a line has gone for others before its test changes it.
+TEST(DepthStencilTraffic, WhatIsChangedOfALineThatHasGoneTakesNoLine) {
+  constexpr unsigned tiles = 64, rounds = 20;
+  const microbench::FramePointer frame =
+      microbench::boxes_of_tiles({{0, 0, 2, 2}}, tiles, rounds, microbench::BoxesAre::stencil_written, {});
+  for (const Fidelity fidelity : fidelities_with_time()) {
+    SCOPED_TRACE(name_of(fidelity));
+    RunRequest request = request_of("baseline", fidelity);
+    const Platform platform = platform_named("gh100-gpc");
+    request.platform = &platform;
+    const RunResult result = run(request, *frame);
+    EXPECT_EQ(statistic(result, "zrop.cache.bytes_filled"), 32U * tiles * rounds) << "each test reads anew";
+  }
 }
 
 TEST(DepthStencilTraffic, MayStayUnconnected) {

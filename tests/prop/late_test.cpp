@@ -172,6 +172,18 @@ TEST_P(LateProp, AWarpWithoutQuadsDoesNotWaitForLateTestsOfThoseBeforeIt) {
 }
 
 // A mark that nobody waits for, and what is not tested late, keep their place behind what is.
+TEST_P(LateProp, AWarpWithoutQuadsTakesNoTimeInWhichOthersAreHandedOn) {
+  make();
+  // 64 cycles of colours; in 20 of these a warp without quads comes.
+  for (unsigned i = 0; i < 16; ++i) shaded->add(warp(i, i, 0, 0), 10);
+  for (unsigned i = 0; i < 20; ++i) shaded->add(warp(16 + i, 16 + i, 0, 0, 0), 125 + i);
+  bench->run();
+  ASSERT_EQ(left.size(), 16U);
+  const double occupied =
+      testing::occupied(bench->unit(), PropWork::color) + testing::occupied(bench->unit(), PropWork::empty_warps);
+  EXPECT_LE(occupied, static_cast<double>(left_at.back() + 4 - left_at.front())) << "the last takes 4 cycles, too";
+}
+
 TEST_P(LateProp, WhatIsNotTestedLateWaitsForWhatIs) {
   make();
   shaded->add(warp(0, 0, 0, 0), 10);

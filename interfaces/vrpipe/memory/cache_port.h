@@ -126,6 +126,18 @@ class CachePort {
     }
     return true;
   }
+  /// Where tags run ahead of data, what is changed of a line that has gone is written at once, as what is put.
+  template <class Moved>
+  bool write_past(std::uint64_t address, std::uint32_t sectors, Moved&& moved) {
+    if (!write_back(moved)) return false;
+    LineAccess gone;
+    gone.old_address = address;
+    gone.written_back = sectors;
+    cache_->count_written_back(sectors);
+    evict(gone);
+    write_back(moved);
+    return true;
+  }
   /// Where tags run ahead of data, who looks up in the cache himself has read what it lacks: for himself, not for a line, which
   /// may go meanwhile. Only while the memory is available; `id`, below 2^31 - 1, comes back from `next_ahead`.
   void read_ahead(std::uint64_t address, unsigned sectors, std::uint32_t id) {

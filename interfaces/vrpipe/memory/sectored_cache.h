@@ -132,6 +132,12 @@ class SectoredCache {
     not_filled_ += static_cast<unsigned>(__builtin_popcount(sectors));
   }
   void make_dirty(Line line, std::uint32_t sectors) { lines_[line].dirty |= sectors; }
+  /// As those of an evicted line; also of one that has gone before its sectors were changed, which are written without it.
+  void count_written_back(std::uint32_t sectors) {
+    const auto count = static_cast<unsigned>(__builtin_popcount(sectors));
+    statistics_->sectors_written_back += count;
+    statistics_->bytes_written_back += count * sector_bytes_;
+  }
   /// After each access in steps, in their order: finds the causes of its misses.
   void looked_up(Line line, std::uint32_t sectors) {
     if (shadow_ != nullptr) follow(address(line), sectors);
@@ -338,11 +344,6 @@ class SectoredCache {
   void count_compulsory(std::uint32_t sectors);
   /// Of sectors that are written whole, or masked. `before`: those that were there, to which they are added.
   void count_unfilled(std::uint32_t sectors, std::uint32_t& before);
-  void count_written_back(std::uint32_t sectors) {
-    const auto count = static_cast<unsigned>(__builtin_popcount(sectors));
-    statistics_->sectors_written_back += count;
-    statistics_->bytes_written_back += count * sector_bytes_;
-  }
   void follow(std::uint64_t line_address, std::uint32_t sectors);
   void follow(std::uint64_t address, unsigned bytes, bool writes);
   void find_conflicts(std::uint32_t missed_by_shadow);
