@@ -26,17 +26,13 @@ class TimedDraw : public TimedUnit {
       in_done_.back()->set_optional();
       in_done_.back()->set_comes_ahead();
     }
-    fetch();
+    have_ = schedule_.next(*behaviour_, warp_);
   }
 
   bool idle() const override { return ended_ == outs_.size(); }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
-  void fetch() {
-    have_ = behaviour_->next(warp_);
-    if (have_ && warp_.mark == Mark::none) schedule_.turn_to(warp_);
-  }
   Cycle due() const { return have_ && warp_.mark == Mark::none ? schedule_.due() : 0; }
 
   Cycle take_done(Cycle visible) {
@@ -66,7 +62,7 @@ class TimedDraw : public TimedUnit {
         const Cycle interval = schedule_.issue();
         if (interval > 0) did(DrawWork::warps, interval, taken, taken + interval);
       }
-      fetch();
+      have_ = schedule_.next(*behaviour_, warp_);
     } else {
       ++ended_;
     }

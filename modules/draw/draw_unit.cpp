@@ -24,17 +24,13 @@ class DrawUnit : public Unit {
       in_done_.back()->set_optional();
       in_done_.back()->set_answers();
     }
-    fetch();
+    have_ = schedule_.next(*behaviour_, warp_);
   }
 
   bool idle() const override { return ended_ == outs_.size(); }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
-  void fetch() {
-    have_ = behaviour_->next(warp_);
-    if (have_ && warp_.mark == Mark::none) schedule_.turn_to(warp_);
-  }
   [[gnu::noinline]] void take_done(Cycle now) {
     for (const auto& in : in_done_) {
       for (; in->ready(); in->pop()) --awaited_;
@@ -73,7 +69,7 @@ class DrawUnit : public Unit {
       } else if (barriers_.is_barrier(warp_.mark)) {
         awaited_ = static_cast<unsigned>(outs_.size());
       }
-      fetch();
+      have_ = schedule_.next(*behaviour_, warp_);
     } else {
       VertexWarp end;
       end.mark = Mark::end_of_frame;

@@ -19,13 +19,11 @@ class IssueSchedule {
         rate_of_warps_(behaviour.warps_per_1024_cycles()),
         rate_of_rectangles_(behaviour.rectangle_warps_per_1024_cycles()),
         rate_(rate_of_warps_) {}
-  /// It is the turn of a warp, which is no mark.
-  void turn_to(const VertexWarp& warp) {
-    const std::uint32_t rate = draws_rectangles(context_.draw(warp.draw)) ? rate_of_rectangles_ : rate_of_warps_;
-    if (rate == rate_) return;
-    begin_ += (issued_ * 1024 + rate_ - 1) / rate_;  // all of the turn of the last one
-    issued_ = 0;
-    rate_ = rate;
+  /// What DRAW issues next, a warp or a mark; false after the last.
+  bool next(DrawBehaviour& behaviour, VertexWarp& out) {
+    const bool is_there = behaviour.next(out);
+    if (is_there && out.mark == Mark::none) turn_to(out);
+    return is_there;
   }
   /// That warp.
   Cycle due() const { return due(issued_); }
@@ -40,6 +38,13 @@ class IssueSchedule {
   }
 
  private:
+  void turn_to(const VertexWarp& warp) {
+    const std::uint32_t rate = draws_rectangles(context_.draw(warp.draw)) ? rate_of_rectangles_ : rate_of_warps_;
+    if (rate == rate_) return;
+    begin_ += (issued_ * 1024 + rate_ - 1) / rate_;  // all of the turn of the last one
+    issued_ = 0;
+    rate_ = rate;
+  }
   Cycle due(std::uint64_t warp) const { return begin_ + warp * 1024 / rate_; }
 
   const RenderContext& context_;

@@ -13,7 +13,7 @@ constexpr unsigned half_of_block(unsigned position) {
 }
 
 /// What tests take by the places that they touch: so much for each half, 4x8 pixels, of an 8x8 block in which a primitive
-/// has quads, and at least so much for the block (measured on a GH100 graphics GPC: 1 and 1.4 cycles).
+/// has quads, and at least so much for the block (measured on a GH100 graphics GPC: 1 and 1.5 cycles).
 class BlockPrice {
  public:
   /// In thousandths of a cycle; all 0: there is no such price.

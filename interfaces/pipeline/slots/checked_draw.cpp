@@ -48,15 +48,10 @@ class CheckedDraw final : public CheckedSlot<DrawBehaviour> {
     return true;
   }
   std::uint32_t warps_per_1024_cycles() const override {
-    const std::uint32_t rate = ask("warps_per_1024_cycles", [&] { return checked_->warps_per_1024_cycles(); });
-    check_rate("warps_per_1024_cycles", rate);
-    return rate;
+    return rate_of("warps_per_1024_cycles", [&] { return checked_->warps_per_1024_cycles(); });
   }
   std::uint32_t rectangle_warps_per_1024_cycles() const override {
-    const std::uint32_t rate =
-        ask("rectangle_warps_per_1024_cycles", [&] { return checked_->rectangle_warps_per_1024_cycles(); });
-    check_rate("rectangle_warps_per_1024_cycles", rate);
-    return rate;
+    return rate_of("rectangle_warps_per_1024_cycles", [&] { return checked_->rectangle_warps_per_1024_cycles(); });
   }
   void check_timing() const override {
     warps_per_1024_cycles();
@@ -65,6 +60,12 @@ class CheckedDraw final : public CheckedSlot<DrawBehaviour> {
   void check_counters() const override {}
 
  private:
+  template <class Question>
+  std::uint32_t rate_of(const char* name, Question&& question) const {
+    const std::uint32_t rate = ask(name, question);
+    check_rate(name, rate);
+    return rate;
+  }
   /// Of a warp, whose threads are vertices.
   std::uint32_t most_splats(DrawIndex draw) const {
     const bool rectangles =
