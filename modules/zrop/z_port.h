@@ -325,13 +325,11 @@ class ZPort {
     bool any = false;
     for (; !changed_.empty(); changed_.pop()) {
       const BeatLines::Needed::Line& line = changed_.front();
+      const bool allocates = !ahead_;  // where tags run ahead lines go as a rule before they are tested
       const bool is_held = port_.cache().find(line.address) != SectoredCache::no_line;
-      const bool is_past = !is_held && ahead_;
-      if (is_past ? !port_.write_past(line.address, line.sectors, moves())
-                  : !port_.put(line.address, line.sectors, moves()))
-        break;
+      if (!port_.put(line.address, line.sectors, allocates, moves())) break;
       // What went in the meantime is accessed anew.
-      if (!is_held && !is_past) count_accesses(static_cast<unsigned>(__builtin_popcount(line.sectors)));
+      if (!is_held && allocates) count_accesses(static_cast<unsigned>(__builtin_popcount(line.sectors)));
       any = true;
     }
     return any;

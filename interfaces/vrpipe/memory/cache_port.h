@@ -110,12 +110,21 @@ class CachePort {
     cache_->looked_up(wanted.line, wanted.sectors);
     return true;
   }
-  /// Puts whole sectors of a line in, which are dirty then; what the cache lacks of them is not read. False while it has to
-  /// wait, as `look_up`.
+  /// Puts whole sectors of a line in, which are dirty then; what the cache lacks of them is not read. If the line has gone it is
+  /// allocated for them, or they are written at once without one. False while it has to wait, as `look_up`.
   template <class Moved>
-  bool put(std::uint64_t address, std::uint32_t sectors, Moved&& moved) {
+  bool put(std::uint64_t address, std::uint32_t sectors, bool allocates, Moved&& moved) {
     if (!write_back(moved)) return false;
     LookUp whole{address, sectors, cache_->find(address), 0};
+    if (whole.line == SectoredCache::no_line && !allocates) {
+      LineAccess gone;
+      gone.old_address = address;
+      gone.written_back = sectors;
+      cache_->count_written_back(sectors);
+      evict(gone);
+      write_back(moved);
+      return true;
+    }
     if (whole.line == SectoredCache::no_line) {
       if (!take_line(whole)) return false;
       cache_->unpin(whole.line);
@@ -124,18 +133,6 @@ class CachePort {
     for (std::uint32_t missing = sectors & cache_->absent(whole.line); missing != 0; missing &= missing - 1) {
       cache_->write(whole.line, static_cast<unsigned>(__builtin_ctz(missing)) << sector_shift_, 1U << sector_shift_);
     }
-    return true;
-  }
-  /// Where tags run ahead of data, what is changed of a line that has gone is written at once, as what is put.
-  template <class Moved>
-  bool write_past(std::uint64_t address, std::uint32_t sectors, Moved&& moved) {
-    if (!write_back(moved)) return false;
-    LineAccess gone;
-    gone.old_address = address;
-    gone.written_back = sectors;
-    cache_->count_written_back(sectors);
-    evict(gone);
-    write_back(moved);
     return true;
   }
   /// Where tags run ahead of data, who looks up in the cache himself has read what it lacks: for himself, not for a line, which
