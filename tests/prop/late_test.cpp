@@ -171,7 +171,6 @@ TEST_P(LateProp, AWarpWithoutQuadsDoesNotWaitForLateTestsOfThoseBeforeIt) {
   EXPECT_TRUE(bench->unit().idle());
 }
 
-// A mark that nobody waits for, and what is not tested late, keep their place behind what is.
 TEST_P(LateProp, AWarpWithoutQuadsTakesNoTimeInWhichOthersAreHandedOn) {
   make();
   // 64 cycles of colours; in 20 of these a warp without quads comes.
@@ -184,6 +183,7 @@ TEST_P(LateProp, AWarpWithoutQuadsTakesNoTimeInWhichOthersAreHandedOn) {
   EXPECT_LE(occupied, static_cast<double>(left_at.back() + 4 - left_at.front())) << "the last takes 4 cycles, too";
 }
 
+// A mark that nobody waits for, and what is not tested late, keep their place behind what is.
 TEST_P(LateProp, WhatIsNotTestedLateWaitsForWhatIs) {
   make();
   shaded->add(warp(0, 0, 0, 0), 10);
