@@ -157,13 +157,15 @@ void Frame::add(const Command& command) {
   commands_.push_back(command);
 }
 
-Frame Frame::part(std::uint32_t first, std::uint32_t end) const {
-  Frame part(width_, height_);
-  part.depth_format_ = depth_format_;
-  part.splats_ = first;
-  const DrawCall& call = draws_.front();
-  if (first < end) part.draw(call.geometry, call.state, call.name, call.first + first, end - first);
-  return part;
+Frame Frame::gone_on_with(std::uint32_t drawn) const {
+  Frame frame = *this;
+  frame.drawn_ = drawn;
+  std::uint16_t passed = 0;
+  for (const DrawCall& call : draws_) {
+    if (call.base < drawn) passed = call.epoch;
+  }
+  for (DrawCall& call : frame.draws_) call.epoch = static_cast<std::uint16_t>(call.epoch - passed);
+  return frame;
 }
 
 void Frame::change_states(const std::function<void(DrawState&)>& change) {

@@ -47,6 +47,11 @@ bool VertexIssue::next(VertexWarp& out) {
   return false;
 }
 
+void leave_out_drawn(DrawBehaviour& draw, const Frame& frame) {
+  VertexWarp warp;
+  while (warp.first_splat + warp.splats < frame.drawn() && draw.next(warp)) continue;
+}
+
 namespace {
 const SlotRegistrar draw_slot{{"draw", 10, "vertex-issue", "", false, check_draw}};
 const Registrar<VertexIssue, DrawBehaviour> registrar("draw", "vertex-issue", "issues sorted splats as vertex warps",

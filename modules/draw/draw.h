@@ -1,6 +1,7 @@
 #pragma once
 
 #include <vrpipe/component/parameter.h>
+#include <vrpipe/pipeline/frame.h>
 #include <vrpipe/pipeline/slots/draw.h>
 
 namespace vrpipe {
@@ -45,5 +46,8 @@ class VertexIssue : public DrawBehaviour {
   bool marked_ = false;       ///< its mark has been issued
   std::uint32_t issued_ = 0;  ///< splats of the draw
 };
+
+/// Leaves out what has been drawn of a frame that is gone on with.
+void leave_out_drawn(DrawBehaviour& draw, const Frame& frame);
 
 }  // namespace vrpipe

@@ -1,3 +1,4 @@
+#include "draw/draw.h"
 #include "draw/issue_schedule.h"
 
 #include <vrpipe/model/timed.h>
@@ -26,6 +27,7 @@ class TimedDraw : public TimedUnit {
       in_done_.back()->set_optional();
       in_done_.back()->set_comes_ahead();
     }
+    leave_out_drawn(*behaviour_, *context.frame);
     have_ = schedule_.next(*behaviour_, warp_);
   }
 

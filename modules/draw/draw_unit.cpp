@@ -1,3 +1,4 @@
+#include "draw/draw.h"
 #include "draw/issue_schedule.h"
 
 #include <vrpipe/model/unit.h>
@@ -24,6 +25,7 @@ class DrawUnit : public Unit {
       in_done_.back()->set_optional();
       in_done_.back()->set_answers();
     }
+    leave_out_drawn(*behaviour_, *context.frame);
     have_ = schedule_.next(*behaviour_, warp_);
   }
 

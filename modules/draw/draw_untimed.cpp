@@ -1,3 +1,5 @@
+#include "draw/draw.h"
+
 #include <vrpipe/model/untimed.h>
 #include <vrpipe/pipeline/geometry.h>
 #include <vrpipe/pipeline/render_context.h>
@@ -22,6 +24,7 @@ class UntimedDraw : public UntimedUnit {
       in_done_.push_back(input<BlendsDone>("in_done_" + std::to_string(gpc), [](const BlendsDone&) {}));
       in_done_.back()->set_optional();
     }
+    leave_out_drawn(*behaviour_, *context.frame);
   }
 
   Behaviour& behaviour() override { return *behaviour_; }

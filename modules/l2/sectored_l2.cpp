@@ -145,7 +145,7 @@ std::vector<OccupancyPart> SectoredL2::least_occupancy(double /*period_ps*/) con
   return {{"banks", 0, static_cast<double>(busiest - std::min(busiest, waiting)) * clock_.ratio(), true}};
 }
 
-void SectoredL2::hold_as(const MemoryBehaviour& other) {
+void SectoredL2::hold_as(const Behaviour& other) {
   const auto& same = dynamic_cast<const SectoredL2&>(other);
   cache_.hold_as(same.cache_);
   origins_ = same.origins_;

@@ -122,7 +122,7 @@ class SectoredL2 final : public MemoryBehaviour {
 
   void access(const MemoryRequest& request) override;
   bool needs_below() const override { return true; }
-  void hold_as(const MemoryBehaviour& other) override;
+  void hold_as(const Behaviour& other) override;
   MemoryBytes delivered() const override { return traffic_.bytes(); }
   MemoryBytes memory_bytes() const override {
     const MemoryBytes of_lines{statistics_.bytes_filled.value(), statistics_.bytes_written_back.value()};

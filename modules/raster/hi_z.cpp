@@ -70,6 +70,12 @@ void HiZ::update(const HiZUpdate& update) {
   }
 }
 
+void HiZ::hold_as(const HiZ& other) {
+  bounds_ = other.bounds_;
+  staged_ = other.staged_;
+  epoch_ = other.epoch_;
+}
+
 namespace {
 const EffectRegistrar hi_z_effect{
     {"raster",

@@ -29,6 +29,8 @@ class HiZ {
   /// Strict termination: it counts once a mark that is waited for comes.
   void update(const HiZUpdate& update);
   bool waits_at(Mark mark) const { return plan_.waits_at(mark); }
+  /// Knows what another one of the frame does.
+  void hold_as(const HiZ& other);
 
  private:
   struct Staged {

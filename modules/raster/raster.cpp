@@ -104,6 +104,10 @@ void TileRasterizer::update(const HiZUpdate& update) {
   hi_z_->update(update);
 }
 
+void TileRasterizer::hold_as(const Behaviour& other) {
+  if (hi_z_ != nullptr) hi_z_->hold_as(*dynamic_cast<const TileRasterizer&>(other).hi_z_);
+}
+
 void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   ++setups;
   primitive_ = primitive;

@@ -167,6 +167,7 @@ class TileRasterizer : public RasterBehaviour {
   void begin(const Primitive& primitive, const PixelRect& clip) override;
   bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) override;
   void update(const HiZUpdate& update) override;
+  void hold_as(const Behaviour& other) override;
   bool waits_at(Mark mark) const override { return hi_z_ != nullptr && hi_z_->waits_at(mark); }
   const RasterTime& time() const override { return time_; }
 

@@ -17,12 +17,8 @@ UntimedGpu::UntimedGpu(const Configuration& configuration, Framebuffer& framebuf
         {&instance, untimed_unit_maker(instance.slot)(instance.path, std::move(behaviour),
                                                       configuration.context_of(instance.gpc), netlist.gpcs())});
   }
-  connect_units(netlist, configuration.request().observers.get(), [&](const std::string& path) -> Component* {
-    for (const Placed& placed : units_) {
-      if (placed.instance->path == path) return placed.unit.get();
-    }
-    return nullptr;
-  });
+  connect_units(netlist, configuration.request().observers.get(),
+                [&](const std::string& path) -> Component* { return unit(path); });
   for (const Placed& placed : units_) check_ports(*placed.unit, placed.instance->path, configuration.platform().name);
   add_memories();
   for (unsigned gpc = 0; gpc < netlist.gpcs(); ++gpc) {
@@ -45,11 +41,16 @@ void UntimedGpu::add_memories() {
     MemoryBehaviour* const below = memory(link.to);
     if (below == nullptr) continue;
     if (MemoryBehaviour* const above = memory(link.from)) above->set_below(*below);
-    for (const Placed& placed : units_) {
-      if (placed.instance->path != link.from) continue;
-      if (UntimedMemoryPort* const port = placed.unit->memory_port()) port->connect(*below);
-    }
+    UntimedUnit* const user = unit(link.from);
+    if (UntimedMemoryPort* const port = user != nullptr ? user->memory_port() : nullptr) port->connect(*below);
   }
+}
+
+UntimedUnit* UntimedGpu::unit(const std::string& path) const {
+  for (const Placed& placed : units_) {
+    if (placed.instance->path == path) return placed.unit.get();
+  }
+  return nullptr;
 }
 
 MemoryBehaviour* UntimedGpu::memory(const std::string& path) const {

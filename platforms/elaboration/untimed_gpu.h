@@ -34,6 +34,7 @@ class UntimedGpu {
   const std::vector<PlacedMemory>& memories() const { return memories_; }
   /// Of a path; null for one that does not, or none.
   MemoryBehaviour* memory(const std::string& path) const;
+  UntimedUnit* unit(const std::string& path) const;  ///< null for none
   /// A slot's unit in a GPC; in a slot of the front end it serves all. Null for none.
   UntimedUnit* of_slot(const std::string& slot, unsigned gpc) const;
 

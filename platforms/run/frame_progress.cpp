@@ -1,5 +1,7 @@
 #include "run/frame_progress.h"
 
+#include <numeric>
+
 #include "elaboration/untimed_gpu.h"
 
 #include <vrpipe/platforms/gpu.h>
@@ -32,10 +34,15 @@ FrameProgress::FrameProgress(const Gpu& gpu) {
 
 void FrameProgress::add(const std::string& slot, const Behaviour& behaviour) {
   behaviours_.push_back(&behaviour.unit());
+  for (const DrawCounter* const counter : behaviours_.back()->draw_counters()) {
+    if (slot == "raster" && counter->name() == std::string("quads_rasterized")) quads_of_draws_.push_back(counter);
+  }
   for (const Counter* const counter : behaviours_.back()->counters()) {
     const auto is = [&](const CounterName& name) { return slot == name.slot && counter->name() == name.name; };
     if (is({"draw", "splats"})) splats_.push_back(counter);
     if (is({"raster", "quads_rasterized"})) quads_.push_back(counter);
+    if (is({"raster", "setups"})) setups_.push_back(counter);
+    if (is({"tgc", "entries"})) entries_.push_back(counter);
     for (std::size_t kind = 0; kind < work_names.size(); ++kind) {
       if (is(work_names[kind])) work_[kind].push_back(counter);
     }
@@ -45,6 +52,15 @@ void FrameProgress::add(const std::string& slot, const Behaviour& behaviour) {
 std::uint64_t FrameProgress::sum(const Counters& counters) {
   std::uint64_t sum = 0;
   for (const Counter* const counter : counters) sum += counter->value();
+  return sum;
+}
+
+std::uint64_t FrameProgress::rasterized_before(DrawIndex draw) const {
+  std::uint64_t sum = 0;
+  for (const DrawCounter* const counter : quads_of_draws_) {
+    const std::vector<std::uint64_t>& of_draw = counter->of_draw();
+    sum = std::accumulate(of_draw.begin(), of_draw.begin() + draw, sum);
+  }
   return sum;
 }
 

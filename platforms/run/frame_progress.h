@@ -25,6 +25,10 @@ class FrameProgress {
 
   std::uint64_t splats() const { return sum(splats_); }     ///< that DRAW has issued
   std::uint64_t rasterized() const { return sum(quads_); }  ///< quads
+  std::uint64_t rasterized_before(DrawIndex draw) const;    ///< of draws before it
+  std::uint64_t set_up() const { return sum(setups_); }     ///< primitives, once for each bin of TGC that they are in
+  /// The same that TGC holds, to be set up later.
+  std::uint64_t held() const { return sum(entries_) > set_up() ? sum(entries_) - set_up() : 0; }
   /// What all units count.
   Counts counts() const;
   SampledWork work() const;
@@ -34,7 +38,8 @@ class FrameProgress {
   void add(const std::string& slot, const Behaviour& behaviour);
   static std::uint64_t sum(const Counters& counters);
   std::vector<const Behaviour*> behaviours_;
-  Counters splats_, quads_;
+  std::vector<const DrawCounter*> quads_of_draws_;
+  Counters splats_, quads_, setups_, entries_;
   std::array<Counters, counted_work_kinds> work_;
 };
 

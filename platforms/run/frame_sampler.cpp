@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <string>
 #include <utility>
 
@@ -40,20 +41,6 @@ const WindowFacts& facts_of(const RunRequest& request) {
   return request.variant.early_termination ? facts_with_termination : facts_without_termination;
 }
 
-/// The share of a range around a centre that is from 0 to `size`.
-double share_on_screen(double center, double extent, double size) {
-  return std::max(0.0, std::min(center + extent, size) - std::max(center - extent, 0.0)) / std::max(2 * extent, 1e-9);
-}
-
-/// Of a splat, about: those in its box and half of those that its edges cross, where they are on the screen.
-double estimated_quads(const Splat& splat, const Frame& frame) {
-  const double across = std::sqrt(double{splat.ax} * splat.ax + double{splat.ay} * splat.ay);
-  const double along = std::sqrt(double{splat.bx} * splat.bx + double{splat.by} * splat.by);
-  return (across * along + across + along + 1) *
-         share_on_screen(splat.cx, std::fabs(splat.ax) + std::fabs(splat.bx), frame.width()) *
-         share_on_screen(splat.cy, std::fabs(splat.ay) + std::fabs(splat.by), frame.height());
-}
-
 }  // namespace
 
 std::optional<UserError> FrameSampler::obstacle(const RunRequest& request) {
@@ -86,19 +73,6 @@ std::optional<UserError> FrameSampler::obstacle(const RunRequest& request) {
   return std::nullopt;
 }
 
-std::optional<UserError> FrameSampler::obstacle(const Frame& frame) {
-  const auto refuse = [](const std::string& why) {
-    return UserError("cannot be sampled", "the frame", why, "use lt or cycle");
-  };
-  if (frame.commands().size() > 1) return refuse("it has several draws or clears, and windows are of one");
-  if (frame.draws().empty()) return std::nullopt;
-  const DrawCall& call = frame.draws().front();
-  if (!call.geometry->triangles.empty() || !call.geometry->mesh.empty())
-    return refuse("it has triangles, and windows are of splats");
-  if (frame.stencil_preset() != nullptr) return refuse("its stencil is preset, and windows know it cleared or drawn");
-  return std::nullopt;
-}
-
 std::optional<std::uint64_t> FrameSampler::windows_for(const RunRequest& request, double error_percent) {
   const WindowFacts& facts = facts_of(request);
   if (error_percent <= facts.bias_percent) return std::nullopt;
@@ -117,38 +91,18 @@ std::uint64_t FrameSampler::more_windows(const RunRequest& request, std::uint64_
   return static_cast<std::uint64_t>(std::ceil(static_cast<double>(windows) * std::clamp(times, 1.0, 4.0)));
 }
 
-FrameSampler::FrameSampler(const RunRequest& request, const Frame& frame, unsigned warm_up_times)
-    : request_(request), frame_(frame), warm_up_quads_(facts_of(request).warm_up_quads * warm_up_times) {
+FrameSampler::FrameSampler(const RunRequest& request, const Frame& frame, unsigned warm_up_times,
+                           const std::vector<double>& course)
+    : request_(request),
+      frame_(frame),
+      plan_(frame, course,
+            {facts_of(request).warm_up_quads * warm_up_times, measured_quads,
+             request.sampling->windows != 0 ? request.sampling->windows : facts_of(request).usual,
+             request.sampling->seed}) {
   request_.sampling.reset();
   request_.observers = nullptr;
   request_.reads_statistics = false;
-  std::vector<double> before{0};  // quads, by splat
-  for (std::uint32_t i = 0; i < frame.splats(); ++i)
-    before.push_back(before.back() + estimated_quads(frame.draws().front().splat(i), frame));
-  estimated_quads_ = before.back();
-  const auto splat_at = [&](double quads) {
-    const auto splat =
-        static_cast<std::uint32_t>(std::lower_bound(before.begin(), before.end(), quads) - before.begin());
-    return std::min(splat, frame.splats()) / splats_per_vertex_warp * splats_per_vertex_warp;
-  };
-  const double begin = measured_quads;
-  // There the estimate may be five times too high without a window that reaches beyond the frame.
-  const double end = std::max(begin, estimated_quads_ - 4 * (warm_up_quads_ + measured_quads));
-  const std::uint64_t strata = request.sampling->windows != 0 ? request.sampling->windows : facts_of(request).usual;
-  const double length = (end - begin) / static_cast<double>(strata);
-  windows_.push_back({0, splat_at(begin)});
-  for (std::uint64_t i = 0; i < strata; ++i) {
-    const double from = begin + length * static_cast<double>(i);
-    const double drawn = static_cast<double>(mix(request.sampling->seed ^ mix(i)) >> 11U) * 0x1p-53;  // in [0, 1)
-    const double at = from + drawn * std::max(0.0, length - measured_quads);
-    windows_.push_back({splat_at(at - warm_up_quads_), splat_at(from + length)});
-  }
-  windows_.push_back({splat_at(end - warm_up_quads_), frame.splats()});
-}
-
-double FrameSampler::share() const {
-  const double quads = static_cast<double>(windows_.size()) * (measured_quads + warm_up_quads_);
-  return quads / std::max(estimated_quads_, 1.0);
+  for (const WindowPlan::Window& planned : plan_.windows()) windows_.push_back({planned});
 }
 
 void FrameSampler::begin(const UntimedGpu& gpu, const Framebuffer& framebuffer) {
@@ -161,28 +115,36 @@ void FrameSampler::begin(const UntimedGpu& gpu, const Framebuffer& framebuffer) 
 }
 
 void FrameSampler::take_step() {
-  steps_.push_back({progress_->splats(), progress_->counts().primitives, static_cast<double>(progress_->rasterized()),
-                    progress_->work()});
+  steps_.push_back({progress_->splats(), progress_->counts().primitives, progress_->set_up(),
+                    static_cast<double>(progress_->rasterized()), progress_->work()});
 }
 
 void FrameSampler::passed() {
-  if (static_cast<double>(progress_->rasterized()) >= steps_.back().quads + quads_of_step) take_step();
-  while (next_ < windows_.size() && progress_->splats() >= windows_[next_].splat) begin(windows_[next_++]);
+  const std::uint64_t splats = progress_->splats();
+  bool ends_draw = false;  // after which splats may be far larger
+  for (; draw_ < frame_.draws().size() && frame_.draws()[draw_].base + frame_.draws()[draw_].splats <= splats; ++draw_)
+    ends_draw = true;
+  if (ends_draw || static_cast<double>(progress_->rasterized()) >= steps_.back().quads + quads_of_step) take_step();
+  while (next_ < windows_.size() && splats >= windows_[next_].planned.splat) begin(windows_[next_++]);
 }
 
 void FrameSampler::begin(Window& window) {
   end_window();
+  if (!is_whole_) return;  // nothing comes of any more
   const bool is_first = &window == &windows_.front();
   own_.color = drawn_->color;
   own_.depth_stencil = drawn_->depth_stencil;
   if (!is_first) own_.depth_stencil.go_on();
-  const SampledWindow::Range range{is_first ? 0 : warm_up_quads_, measured_quads, &window == &windows_.back()};
-  window.from = static_cast<double>(progress_->rasterized()) + range.from;
-  window.to = window.from + measured_quads;
+  SampledWindow::Range range;
+  range.from = window.planned.warm_up;
+  range.quads = measured_quads;
+  range.around = window.planned.around;
+  range.to_end = &window == &windows_.back();
+  window.begin = static_cast<double>(progress_->rasterized());
+  window.set_up_or_held = progress_->set_up() + progress_->held();
   window.primitives_from = window.primitives_to = progress_->counts().primitives;
   under_way_ = &window;
-  run_ = std::make_unique<SampledWindow>(request_,
-                                         frame_.part(static_cast<std::uint32_t>(progress_->splats()), frame_.splats()),
+  run_ = std::make_unique<SampledWindow>(request_, frame_.gone_on_with(static_cast<std::uint32_t>(progress_->splats())),
                                          range, *gpu_, own_);
 }
 
@@ -190,6 +152,8 @@ void FrameSampler::end_window() {
   if (run_ == nullptr) return;
   const SampledWindow::Measured measured = run_->result();
   run_.reset();
+  under_way_->from = under_way_->begin + measured.from;
+  under_way_->to = under_way_->begin + measured.to;
   under_way_->cycles = measured.cycle_to - measured.cycle_from;
   under_way_->delay_growth = measured.delay_growth;
   under_way_->primitives_from += measured.primitives_from;
@@ -207,16 +171,17 @@ void FrameSampler::end() {
   find_busiest();
 }
 
-/// TGC holds primitives when a window begins, and the window's own is empty then: its quads are later ones.
+/// TGC holds primitives when a window begins, and the window's own is empty then: its quads are later ones, by about those of as
+/// many primitives.
 void FrameSampler::find_in_course() {
   for (std::size_t i = 1; i < windows_.size(); ++i) {
     Window& window = windows_[i];
-    const double from_later = quads_at_primitive(window.primitives_from) - window.from;
-    const double to_later = quads_at_primitive(window.primitives_to) - window.to;
-    const double later = i + 1 == windows_.size() ? from_later : (from_later + to_later) / 2;
+    const double ahead_from = quads_at_primitive(window.primitives_from) - window.from;
+    const double ahead_to = quads_at_primitive(window.primitives_to) - window.to;
+    window.lead_growth = ahead_to - ahead_from;
+    const double later = quads_at_setup(window.set_up_or_held) - window.begin;
     window.from += later;
     window.to += later;
-    window.lead_growth = to_later - from_later;
   }
 }
 
@@ -262,10 +227,22 @@ double FrameSampler::quads_at_primitive(std::uint64_t primitive) const {
       [](const Step& step) { return step.quads; });
 }
 
-double FrameSampler::quads_at_splat(std::uint32_t splat) const {
+double FrameSampler::quads_at_setup(std::uint64_t setup) const {
+  return interpolated(
+      steps_, static_cast<double>(setup), [](const Step& step) { return static_cast<double>(step.set_up); },
+      [](const Step& step) { return step.quads; });
+}
+
+double FrameSampler::quads_at_splat(double splat) const {
   return interpolated(
       steps_, splat, [](const Step& step) { return static_cast<double>(step.splats); },
       [](const Step& step) { return step.quads; });
+}
+
+std::vector<double> FrameSampler::course() const {
+  std::vector<double> course;
+  for (std::uint32_t splat = 0; splat <= frame_.splats(); ++splat) course.push_back(quads_at_splat(splat));
+  return course;
 }
 
 SampledWork FrameSampler::work_between(double from, double to) const {
@@ -281,19 +258,56 @@ SampledWork FrameSampler::work_between(double from, double to) const {
   return work;
 }
 
+/// Whether another draw begins in it, or where it warms up.
+bool FrameSampler::is_at_change(const Window& window) const {
+  return std::any_of(frame_.draws().begin(), frame_.draws().end(), [&](const DrawCall& call) {
+    return call.base > 0 && call.base >= window.planned.splat && quads_at_splat(call.base) < window.to;
+  });
+}
+
 template <class OfWindow, class Whole>
 FrameSampler::Growth FrameSampler::growth(const OfWindow& of_window, const Whole& whole) const {
   double sum = 0, squares = 0, wholes = 0;
-  const std::size_t between = windows_.size() - 2;
-  for (std::size_t i = 1; i <= between; ++i) {
+  std::size_t between = 0;
+  for (std::size_t i = 1; i + 1 < windows_.size(); ++i) {
+    if (is_at_change(windows_[i])) continue;  // where they empty and fill in the frame, too
+    ++between;
     const double grown = of_window(windows_[i]);
     sum += grown;
     squares += grown * grown;
     wholes += whole(windows_[i]);
   }
+  if (between < 2) return {0, 0};
   const auto count = static_cast<double>(between);
   const double deviation = std::sqrt(std::max(0.0, count * squares - sum * sum) / (count - 1));
   return {100 * sum / wholes, 100 * deviation / wholes};
+}
+
+/// Of the course without time. The first window and the last are where they are.
+std::vector<std::pair<double, double>> FrameSampler::quads_of(const WindowPlan::Window& planned) const {
+  const double half = measured_quads / 2;
+  const double first = windows_.front().to, last = windows_.back().from;
+  const auto change_at = [&](DrawIndex draw) { return quads_at_splat(frame_.draw_call(draw).base); };
+  std::vector<std::pair<double, double>> parts;
+  const auto add = [&](double from, double to) {
+    from = std::max(from, first);
+    to = std::min(to, last);
+    if (from < to) parts.emplace_back(from, to);
+  };
+  for (const DrawIndex draw : planned.about_draws) add(change_at(draw) - half, change_at(draw) + half);
+  const WindowPlan::PlaceRange middle = plan_.middle();
+  for (const WindowPlan::PlaceRange& range : planned.ranges) {
+    double from = range.from <= middle.from ? first : quads_at_splat(range.from);
+    const double to = range.to >= middle.to ? last : quads_at_splat(range.to);
+    for (const DrawIndex draw : plan_.changes()) {
+      const double change = change_at(draw);
+      if (change + half <= from || change - half >= to) continue;
+      add(from, change - half);
+      from = change + half;
+    }
+    add(from, to);
+  }
+  return parts;
 }
 
 std::optional<FrameSampler::Result> FrameSampler::result() const {
@@ -301,14 +315,19 @@ std::optional<FrameSampler::Result> FrameSampler::result() const {
   const Window& head = windows_.front();
   const Window& tail = windows_.back();
   std::vector<SampledStratum> strata;
-  double from = head.to;
   for (std::size_t i = 1; i + 1 < windows_.size(); ++i) {
     const Window& window = windows_[i];
-    const bool is_last = i + 2 == windows_.size();
-    const double to = std::max(from, is_last ? tail.from : quads_at_splat(window.stratum_end));
-    strata.push_back({to - from, work_between(from, to), window.to - window.from, work_between(window.from, window.to),
-                      window.cycles});
-    from = to;
+    SampledStratum stratum;
+    stratum.group = window.planned.group;
+    for (const auto& [from, to] : quads_of(window.planned)) {
+      stratum.quads += to - from;
+      const SampledWork work = work_between(from, to);
+      std::transform(work.begin(), work.end(), stratum.work.begin(), stratum.work.begin(), std::plus<>());
+    }
+    stratum.window_quads = window.to - window.from;
+    stratum.window_work = work_between(window.from, window.to);
+    stratum.window_cycles = window.cycles;
+    strata.push_back(stratum);
   }
   const EstimatedTime middle = estimate_time(strata);
   const double cycles = middle.cycles + head.cycles + tail.cycles;

@@ -5,11 +5,13 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "run/frame_progress.h"
 #include "run/sampled_time.h"
 #include "run/sampled_window.h"
+#include "run/window_plan.h"
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/pipeline/frame.h>
@@ -26,9 +28,8 @@ class UntimedGpu;
 /// of about equal numbers of quads. One window at a time runs on a thread of its own, beside the frame.
 class FrameSampler {
  public:
-  /// Why a run, or that of a frame, cannot be sampled; none if it can.
+  /// Why a run cannot be sampled; none if it can.
   static std::optional<UserError> obstacle(const RunRequest& request);
-  static std::optional<UserError> obstacle(const Frame& frame);
   /// Of which half the interval is, by experience, so many percent; none if it is never as narrow.
   static std::optional<std::uint64_t> windows_for(const RunRequest& request, double error_percent);
   /// After so many were not near enough; at most four times as many.
@@ -38,9 +39,11 @@ class FrameSampler {
   /// Both outlive it.
   /// @param request  at fidelity `cycle`, with a sampling
   /// @param warm_up_times  as long as windows usually warm up
-  FrameSampler(const RunRequest& request, const Frame& frame, unsigned warm_up_times = 1);
+  /// @param course  as estimated_course, or that of another one of the frame
+  FrameSampler(const RunRequest& request, const Frame& frame, unsigned warm_up_times,
+               const std::vector<double>& course);
   /// Of the frame, about, that is in windows or warms them up.
-  double share() const;
+  double share() const { return plan_.share(); }
   /// Whether that is less than half of it.
   bool is_worth_while() const { return share() < 0.5; }
 
@@ -60,18 +63,21 @@ class FrameSampler {
   };
   /// Then; none if the frame ended before a window did.
   std::optional<Result> result() const;
+  /// Then: quads that were rasterised before each splat, and in all.
+  std::vector<double> course() const;
 
  private:
   /// The course of the frame without time.
   struct Step {
-    std::uint64_t splats = 0, primitives = 0;
+    std::uint64_t splats = 0, primitives = 0, set_up = 0;
     double quads = 0;  ///< rasterised
     SampledWork work{};
   };
   struct Window {
-    std::uint32_t splat = 0;        ///< with which warming up begins
-    std::uint32_t stratum_end = 0;  ///< splat
-    double from = 0, to = 0;        ///< quads rasterised before it and its end, in the course without time
+    WindowPlan::Window planned;
+    double begin = 0;                  ///< quads rasterised before it warms up
+    double from = 0, to = 0;           ///< quads rasterised before it and its end, in the course without time
+    std::uint64_t set_up_or_held = 0;  ///< primitives in bins when it begins to warm up
     std::uint64_t primitives_from = 0, primitives_to = 0;  ///< issued before these
     double cycles = 0;
     double delay_growth = 0;  ///< cycles
@@ -83,8 +89,11 @@ class FrameSampler {
   void find_in_course();
   void find_busiest();
   double quads_at_primitive(std::uint64_t primitive) const;
-  double quads_at_splat(std::uint32_t splat) const;
+  double quads_at_setup(std::uint64_t setup) const;
+  double quads_at_splat(double splat) const;
+  std::vector<std::pair<double, double>> quads_of(const WindowPlan::Window& planned) const;
   SampledWork work_between(double from, double to) const;
+  bool is_at_change(const Window& window) const;
   /// Of something from the beginnings of windows to their ends, on average, in shares of something that they have.
   struct Growth {
     double percent, standard_error;
@@ -96,10 +105,10 @@ class FrameSampler {
 
   RunRequest request_;
   const Frame& frame_;
-  const double warm_up_quads_;
-  double estimated_quads_ = 0;
+  const WindowPlan plan_;
   std::vector<Window> windows_;
   std::size_t next_ = 0;  ///< window
+  std::size_t draw_ = 0;  ///< that has not ended
   const UntimedGpu* gpu_ = nullptr;
   const Framebuffer* drawn_ = nullptr;
   std::optional<FrameProgress> progress_;

@@ -56,8 +56,10 @@ std::optional<RunResult> simulate_windows(const RunRequest& request, const Frame
   functional.sampling.reset();
   functional.effects.with.emplace_back("l2.contents");
   why_not.clear();
-  for (unsigned warm_up_times = 1;; warm_up_times *= 4) {
-    FrameSampler sampler(request, frame, warm_up_times);
+  std::vector<double> course = estimated_course(frame);
+  bool is_estimated = true;
+  for (unsigned warm_up_times = 1;;) {
+    FrameSampler sampler(request, frame, warm_up_times, course);
     if (!sampler.is_worth_while()) {
       why_not +=
           why_not.empty() ? "half of the frame would be in windows" : ", and half of the frame would be in longer ones";
@@ -79,11 +81,15 @@ std::optional<RunResult> simulate_windows(const RunRequest& request, const Frame
     in_vain += result;
     if (!sampled) {
       why_not = "the frame ended before its windows";
-      return std::nullopt;
+      if (!is_estimated) return std::nullopt;
+      course = sampler.course();  // of less than was estimated, as where much lies behind something
+      is_estimated = false;
+      continue;
     }
     why_not = fmt::format("queues went on to fill in windows, for {:.0f} % of their time and {:.0f} % of their quads",
                           sampled->report.delay_growth_percent, sampled->report.lead_growth_percent);
     if (!sampled->front_end_is_settled) return std::nullopt;
+    warm_up_times *= 4;
   }
 }
 
@@ -92,7 +98,6 @@ std::optional<RunResult> simulate_windows(const RunRequest& request, const Frame
 RunResult simulate_sampled(const RunRequest& request, const Frame& frame, std::atomic<float>* progress) {
   check_sampling_has_time(request);
   check_may_sample(request);
-  if (const auto obstacle = FrameSampler::obstacle(frame)) throw *obstacle;
   HostTime in_vain;
   std::string why_not;
   if (auto result = simulate_windows(request, frame, progress, in_vain, why_not)) {
@@ -167,7 +172,7 @@ class WayWithin {
   void choose_windows() {
     sampled_.fidelity = Fidelity::cycle;
     if (!sampled_.sampling) sampled_.sampling.emplace();
-    if (FrameSampler::obstacle(sampled_) || FrameSampler::obstacle(frame_)) {
+    if (FrameSampler::obstacle(sampled_)) {
       because_.emplace_back("it cannot be sampled");
     } else if (const auto windows = FrameSampler::windows_for(sampled_, request_.error_percent)) {
       sampled_.sampling->windows = *windows;
@@ -176,7 +181,9 @@ class WayWithin {
       because_.emplace_back("windows are never as near");
     }
   }
-  double time_of_windows() const { return time_of_functional + FrameSampler(sampled_, frame_).share(); }
+  double time_of_windows() const {
+    return time_of_functional + FrameSampler(sampled_, frame_, 1, estimated_course(frame_)).share();
+  }
 
   std::optional<RunResult> by_windows() {
     --windows_left_;
@@ -239,8 +246,8 @@ void check_may_sample(const RunRequest& request) {
 }
 
 bool takes_windows(const RunRequest& request, const Frame& frame) {
-  return request.sampling && !FrameSampler::obstacle(request) && !FrameSampler::obstacle(frame) &&
-         FrameSampler(request, frame).is_worth_while();
+  return request.sampling && !FrameSampler::obstacle(request) &&
+         FrameSampler(request, frame, 1, estimated_course(frame)).is_worth_while();
 }
 
 }  // namespace vrpipe

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 namespace vrpipe {
@@ -91,12 +92,25 @@ EstimatedTime estimate_time(const std::vector<SampledStratum>& strata) {
     beyond.push_back(of_window * stratum.quads / stratum.window_quads);
     time.cycles += cycles_of(stratum.work, prices) + beyond.back();
   }
-  const auto count = static_cast<double>(strata.size());
-  const auto free = count - static_cast<double>(fitted) - 1;
-  const double mean = std::accumulate(beyond.begin(), beyond.end(), 0.0) / count;
-  double squares = 0;
-  for (const double each : beyond) squares += (each - mean) * (each - mean);
-  time.half_width = t95(free) * std::sqrt(count * squares / free);
+  struct OfGroup {
+    double count = 0, sum = 0, squares = 0;
+  };
+  std::map<std::size_t, OfGroup> groups;
+  for (std::size_t i = 0; i < strata.size(); ++i) {
+    OfGroup& group = groups[strata[i].group];
+    ++group.count;
+    group.sum += beyond[i];
+    group.squares += beyond[i] * beyond[i];
+  }
+  double free = -static_cast<double>(fitted), variance = 0;
+  for (const auto& [number, group] : groups) {
+    if (group.count < 2) continue;
+    free += group.count - 1;
+    variance += group.count * std::max(0.0, group.squares - group.sum * group.sum / group.count) / (group.count - 1);
+  }
+  // As if prices had been taken from all alike.
+  free = std::max(free, 1.0);
+  time.half_width = t95(free) * std::sqrt(variance * (free + static_cast<double>(fitted)) / free);
   return time;
 }
 

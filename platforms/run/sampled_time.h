@@ -15,6 +15,7 @@ using SampledWork = std::array<double, counted_work_kinds + 1>;
 struct SampledStratum {
   double quads = 0;  ///< of all of it
   SampledWork work{};
+  std::size_t group = 0;    ///< of strata alike
   double window_quads = 0;  ///< of the window in it
   SampledWork window_work{};
   double window_cycles = 0;
@@ -27,8 +28,8 @@ struct EstimatedTime {
 
 /// Cycles of all strata by those of their windows: those that the work takes, at prices of no less than 0 that fit those of the
 /// windows best, and what a window took beyond that, for each quad of its stratum: a generalised regression estimator (Sarndal,
-/// Swensson and Wretman, Model Assisted Survey Sampling, 6.4). The variance is that of windows that were drawn without strata, of
-/// which strata only take away.
+/// Swensson and Wretman, Model Assisted Survey Sampling, 6.4). The variance is that of windows of a group that were drawn without strata, of
+/// which strata only take away; a window alone in its group stands for about itself.
 ///
 /// @param strata  in the order of the frame; twelve at least
 EstimatedTime estimate_time(const std::vector<SampledStratum>& strata);

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <future>
+#include <optional>
 
 #include "run/frame_progress.h"
 
@@ -20,12 +21,14 @@ class UntimedGpu;
 class SampledWindow {
  public:
   struct Range {
-    double from = 0;      ///< quads that warm it up
-    double quads = 0;     ///< that are measured then
-    bool to_end = false;  ///< of the frame
+    double from = 0;                  ///< quads that warm it up
+    double quads = 0;                 ///< that are measured then
+    std::optional<DrawIndex> around;  ///< in place of `from`: half of them are before this draw
+    bool to_end = false;              ///< of the frame
   };
   struct Measured {
-    std::uint64_t primitives_from = 0, primitives_to = 0;  ///< since it began to warm up, as the cycles
+    double from = 0, to = 0;                               ///< quads since it began to warm up
+    std::uint64_t primitives_from = 0, primitives_to = 0;  ///< since then, as the cycles
     double cycle_from = 0, cycle_to = 0;
     double delay_growth = 0;  ///< cycles that its last quads take longer to the end than its first
     std::uint64_t kernel_events = 0;

@@ -88,6 +88,31 @@ TEST_P(DrawMarksTest, AMarkWaitsForNoIntervalAndPutsOffNoWarp) {
   EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), DrawWork::warps, 10'000), 3 * 128) << "marks occupy nothing";
 }
 
+TEST_P(DrawMarksTest, AFrameThatIsGoneOnWithIsIssuedBehindWhatWasDrawn) {
+  Frame frame(16, 16);
+  frame.clear({true, false});  // 0
+  frame.draw(splats(12), pruned_at(0.1F));
+  frame.draw(splats(8), pruned_at(0.2F));  // 2
+  frame.clear({false, true});              // 3
+  frame.draw(splats(8), pruned_at(0.2F));
+  const auto goes_on = [&](std::uint32_t drawn) {
+    const Frame rest = frame.gone_on_with(drawn);
+    Bench bench(GetParam(), "draw", "vertex-issue", context_of(rest));
+    Sink<VertexWarp>& warps = bench.sink<VertexWarp>("out_vertices_0");
+    bench.run();
+    Words words;
+    for (const auto& record : warps.records()) words.push_back(words_of(record.item));
+    return words;
+  };
+  const Words all{"mark 0",           "draw 0: 0 to 7", "draw 0: 8 to 11",  "mark 2",
+                  "draw 1: 12 to 19", "mark 3",         "draw 2: 20 to 27", "end"};
+  EXPECT_EQ(goes_on(0), all);
+  EXPECT_EQ(goes_on(8), Words(all.begin() + 2, all.end()));
+  EXPECT_EQ(goes_on(12), Words(all.begin() + 3, all.end())) << "the next draw's mark is still to come";
+  EXPECT_EQ(goes_on(20), Words(all.begin() + 5, all.end()));
+  EXPECT_EQ(goes_on(28), Words{"end"});
+}
+
 TEST_P(DrawMarksTest, WarpsOfFilledRectanglesGoAtARateOfTheirOwn) {
   DrawState rectangles;
   rectangles.splat_extent = SplatExtent::fill_rectangle;

@@ -9,6 +9,7 @@
 #include <vrpipe/pipeline/frame.h>
 #include <vrpipe/platforms/simulation.h>
 
+#include "fidelity/sampled_draws.h"
 #include "support/refusals.h"
 #include "support/simulate.h"
 
@@ -16,24 +17,6 @@ namespace vrpipe {
 namespace {
 
 using namespace testing;
-
-/// Splats whose size and place change in the course of the draw, as those of a scene do from front to back.
-Draw changing_draw(std::uint32_t splats, std::uint64_t seed) {
-  Draw draw = random_draw(256, 192, splats, seed);
-  for (std::uint32_t i = 0; i < splats; ++i) {
-    Splat& splat = draw.splats[i];
-    const float along = static_cast<float>(i) / static_cast<float>(splats);
-    const float size = seed % 2 == 0 ? 1.0F + along : 2.0F - along;
-    for (float* const extent : {&splat.ax, &splat.ay, &splat.bx, &splat.by}) *extent *= size;
-    if (seed % 3 == 0) splat.cx *= 0.4F + 0.6F * along;
-  }
-  return draw;
-}
-
-RunRequest sampled(RunRequest request, std::uint64_t seed = 1) {
-  request.sampling = Sampling{16, seed};
-  return request;
-}
 
 RunRequest on(const char* platform, RunRequest request) {
   request.platform = &platform_named(platform);
@@ -175,24 +158,8 @@ TEST(Sampled, RefusesWhatItCannotHaveWindowsOf) {
   EXPECT_NE(refusal(request).find("--until"), std::string::npos);
   request = sampled(request_of("baseline", Fidelity::lt));
   EXPECT_NE(refusal(request).find("simulated at cycle"), std::string::npos);
-  Frame frame(64, 48);
-  const auto geometry = std::make_shared<const Draw>(draw);
-  frame.draw(geometry, draw_state_of(request_of("baseline")));
-  frame.draw(geometry, draw_state_of(request_of("baseline")));
-  EXPECT_NE(refusal_of([&] { run(sampled(request_of("baseline")), frame); }).find("several draws"), std::string::npos);
   EXPECT_NE(refusal_of([&] { choose_fidelity(request, "sampled,crop=cycle"); }).find("write sampled alone"),
             std::string::npos);
-}
-
-TEST(Sampled, ThePartOfAFrameIsItsSplatsUnderTheirNumbers) {
-  const Draw draw = random_draw(64, 48, 100, 3);
-  const std::shared_ptr<Frame> frame = Frame::of(draw);
-  const Frame part = frame->part(24, 90);
-  ASSERT_EQ(part.draws().size(), 1);
-  EXPECT_EQ(part.draws().front().base, 24);
-  EXPECT_EQ(part.draws().front().splats, 66);
-  EXPECT_EQ(part.draws().front().splat(24).cx, draw.splats[24].cx);
-  EXPECT_EQ(part.draws().front().splat(89).cx, draw.splats[89].cx);
 }
 
 TEST(WithinAnError, TakesLtWhereThatSaysSo) {

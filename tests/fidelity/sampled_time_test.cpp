@@ -63,5 +63,24 @@ TEST(SampledTime, ItsIntervalHolds95InAHundred) {
   EXPECT_GE(inside, 376) << "of 400";  // 380 expected, less one standard deviation
 }
 
+TEST(SampledTime, WhatGroupsTakeBeyondTheirWorkIsNoChanceBetweenThem) {
+  unsigned inside = 0;
+  for (std::uint64_t seed = 1; seed <= 400; ++seed) {
+    SyntheticFrame frame(seed, 0.01);
+    for (std::size_t i = 0; i < 4; ++i) {
+      SampledStratum& stratum = frame.strata[6 * i];
+      stratum.window_cycles += 0.05 * stratum.window_quads;
+      frame.cycles += 0.05 * stratum.quads;
+    }
+    const EstimatedTime as_one = estimate_time(frame.strata);
+    for (std::size_t i = 0; i < 4; ++i) frame.strata[6 * i].group = 1;
+    const EstimatedTime time = estimate_time(frame.strata);
+    EXPECT_EQ(time.cycles, as_one.cycles);
+    inside += std::fabs(time.cycles - frame.cycles) <= time.half_width ? 1 : 0;
+    EXPECT_LT(time.half_width, 0.8 * as_one.half_width) << seed;
+  }
+  EXPECT_GE(inside, 376) << "of 400";
+}
+
 }  // namespace
 }  // namespace vrpipe

@@ -79,6 +79,22 @@ TEST(Frame, OnlyClearsOfTerminationBeginAnEpoch) {
   EXPECT_EQ(frame.draw_call(2).epoch, 3);
 }
 
+TEST(Frame, EpochsOfOneThatIsGoneOnWithAreCountedFromThere) {
+  const auto geometry = numbered_splats(4);
+  Frame frame(64, 48);
+  frame.clear({false, true});
+  frame.draw(geometry, {});
+  frame.clear({false, true});
+  frame.draw(geometry, {});
+  const auto epoch_of_last = [&](std::uint32_t drawn) { return frame.gone_on_with(drawn).draw_call(1).epoch; };
+  EXPECT_EQ(epoch_of_last(0), 2);
+  EXPECT_EQ(epoch_of_last(1), 1);
+  EXPECT_EQ(epoch_of_last(4), 1) << "the clear is still to come";
+  EXPECT_EQ(epoch_of_last(5), 0);
+  EXPECT_EQ(frame.gone_on_with(5).drawn(), 5);
+  EXPECT_EQ(frame.gone_on_with(5).draw_call(1).splat(6).cx, frame.draw_call(1).splat(6).cx);
+}
+
 TEST(Frame, ADrawChangesStateIfTheDrawBeforeItHadAnother) {
   const auto geometry = numbered_splats(1);
   Frame frame(64, 48);

@@ -251,6 +251,19 @@ TEST(HiZ, CullsWhatFailsAtEverySampleAlone) {
   EXPECT_GT(well_behind, 100000U);
 }
 
+TEST(HiZ, HoldsWhatAnotherOneOfTheFrameHas) {
+  const Scene scene(7, false, DepthFormat::d24, Compare::less);
+  const TileRasterizer::Parameters parameters;
+  TileRasterizer told(parameters, scene.context()), holds(parameters, scene.context());
+  scene.tell(told);
+  holds.hold_as(told);
+  for (const Primitive& primitive : scene.assembled())
+    EXPECT_EQ(scene.rasterize(holds, primitive), scene.rasterize(told, primitive)) << primitive.splat;
+  EXPECT_GT(holds.hi_z_culled.value(), 0U);
+  EXPECT_EQ(holds.hi_z_culled.value(), told.hi_z_culled.value());
+  EXPECT_EQ(holds.hi_z_updates.value(), 0U);
+}
+
 TEST(HiZ, IsNotBuiltWhereNothingIsStored) {
   const Draw draw = testing::draw_of(hi_z_width, hi_z_height, {testing::round_splat(20, 20, 5, 1)});
   DrawState state;

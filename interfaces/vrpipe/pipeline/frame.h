@@ -31,7 +31,8 @@ struct DrawCall {
   std::uint32_t splats = 0;  ///< drawn from there on
   /// What the first one is called in the frame, where splats are numbered through all draws; set by the frame.
   std::uint32_t base = 0;
-  std::uint16_t epoch = 0;  ///< clears of termination before this draw; set by the frame
+  /// Clears of termination before this draw, of those that DRAW issues; set by the frame.
+  std::uint16_t epoch = 0;
 
   const Splat& splat(std::uint32_t number) const { return geometry->splats[first + (number - base)]; }
   /// Null where the splat is drawn as its box.
@@ -88,8 +89,10 @@ class Frame {
   const DrawCall& draw_call(DrawIndex draw) const { return draws_[draw]; }
   /// Whether a mark clears all that draws of the frame keep in the depth-stencil target.
   bool clears_depth_stencil(Mark mark) const;
-  /// Of a frame of one draw: its splats from `first` to `end` - 1, called as here. The stencil is not preset.
-  Frame part(std::uint32_t first, std::uint32_t end) const;
+  /// The same frame, of which so many splats, and the commands before the next one's, have been drawn: DRAW goes on behind
+  /// them, in a framebuffer that has them.
+  Frame gone_on_with(std::uint32_t drawn) const;
+  std::uint32_t drawn() const { return drawn_; }  ///< splats
   /// Changes the state of every draw.
   void change_states(const std::function<void(DrawState&)>& change);
   std::uint32_t splats() const { return splats_; }  ///< of all draws
@@ -116,6 +119,7 @@ class Frame {
   std::uint32_t height_;
   DepthFormat depth_format_ = DepthFormat::d24;
   std::uint32_t splats_ = 0;
+  std::uint32_t drawn_ = 0;
   std::uint16_t epoch_ = 0;
   std::vector<Command> commands_;
   std::vector<DrawCall> draws_;

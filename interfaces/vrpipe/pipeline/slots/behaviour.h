@@ -29,6 +29,9 @@ class Behaviour : public StatisticSet {
   virtual const Behaviour& unit() const { return *this; }
   /// Before anything is drawn, of a unit that draws into surfaces of the frame or reads them.
   virtual void use_surfaces(Framebuffer& /*framebuffer*/) {}
+  /// Holds from now on what another one holds, which is of the same make and parameters, and whose frame is gone on with here: what
+  /// some thousand quads do not bring about by themselves, as the tags of a large cache or Hi-Z. Nothing is counted.
+  virtual void hold_as(const Behaviour& /*other*/) {}
   /// Adds what it counts to the counts of the frame, or to those of a draw: `of` takes that from a counter.
   virtual void add_to(Counts& /*counts*/, const CountOf& /*of*/) const {}
   /// Called when the frame has ended: what can be checked only then.

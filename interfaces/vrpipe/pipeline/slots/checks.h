@@ -191,6 +191,9 @@ class CheckedSlot : public SlotBehaviour, public Checks {
   CheckedSlot(std::string name, const RenderContext& context, std::unique_ptr<SlotBehaviour> checked)
       : Checks(std::move(name), context), checked_(std::move(checked)) {}
   const Behaviour& unit() const override { return *checked_; }
+  void hold_as(const Behaviour& other) override {
+    ask("hold_as", [&] { checked_->hold_as(other.unit()); });
+  }
 
  protected:
   const std::unique_ptr<SlotBehaviour> checked_;

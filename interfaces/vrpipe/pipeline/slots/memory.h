@@ -23,9 +23,6 @@ class MemoryBehaviour : public Behaviour {
   /// The memory below, which outlives this one.
   void set_below(MemoryBehaviour& below) { below_ = &below; }
 
-  /// Holds from now on what another one holds, which is of the same make and parameters. Nothing is counted.
-  virtual void hold_as(const MemoryBehaviour& /*other*/) {}
-
   /// By `access`: to those above, and from the memory below.
   virtual MemoryBytes delivered() const { return {}; }
   virtual MemoryBytes memory_bytes() const { return {}; }
