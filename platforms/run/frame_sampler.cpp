@@ -30,7 +30,7 @@ constexpr double most_lead_percent = 25;
 /// Of windows, as measured (docs/accuracy.md). Between quads that terminate, queues between RASTER and CROP take long to be as full
 /// as they are in the whole frame.
 struct WindowFacts {
-  double warm_up_quads;
+  double warm_up_quads;   ///< of each GPC, whose queues are its own
   double bias_percent;    ///< of windows that begin otherwise than the frame goes on, whatever their number
   double spread_percent;  ///< half the interval times the root of the number of windows
   std::uint64_t usual;    ///< windows, where nobody says how many
@@ -53,11 +53,6 @@ std::optional<UserError> FrameSampler::obstacle(const RunRequest& request) {
   }
   if (request.fidelity != Fidelity::cycle) {
     return refuse(std::string("fidelity ") + name_of(request.fidelity), "windows are simulated at cycle", "use cycle");
-  }
-  if (gpcs_of(request) > 1) {
-    return refuse("platform " + request.platform->name,
-                  "windows are of one GPC: several do not come as far side by side",
-                  "use lt or cycle, or platform.gpcs=1");
   }
   Netlist netlist(1);
   request.platform->wire(netlist);
@@ -96,7 +91,7 @@ FrameSampler::FrameSampler(const RunRequest& request, const Frame& frame, unsign
     : request_(request),
       frame_(frame),
       plan_(frame, course,
-            {facts_of(request).warm_up_quads * warm_up_times, measured_quads,
+            {facts_of(request).warm_up_quads * warm_up_times * gpcs_of(request), measured_quads,
              request.sampling->windows != 0 ? request.sampling->windows : facts_of(request).usual,
              request.sampling->seed}) {
   request_.sampling.reset();

@@ -36,7 +36,7 @@ class FrameSampler {
   static std::uint64_t more_windows(const RunRequest& request, std::uint64_t windows, double half_interval_percent,
                                     double error_percent);
 
-  /// Both outlive it.
+  /// All outlive it.
   /// @param request  at fidelity `cycle`, with a sampling
   /// @param warm_up_times  as long as windows usually warm up
   /// @param course  as estimated_course, or that of another one of the frame

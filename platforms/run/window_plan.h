@@ -41,6 +41,7 @@ class WindowPlan {
     std::vector<DrawIndex> about_draws;  ///< what is about their beginnings
   };
 
+  /// The frame and the course outlive it.
   /// @param course  as estimated_course
   WindowPlan(const Frame& frame, const std::vector<double>& course, const Sizes& sizes);
 

@@ -120,6 +120,13 @@ Frame of_triangles(const DrawState& state) {
   return frame;
 }
 
+/// Long enough for four.
+Frame of_several_gpcs(const DrawState& state) {
+  Frame frame(sampled_width, sampled_height);
+  frame.draw(receding_draw(90000, 2), state);
+  return frame;
+}
+
 TEST(SampledFrames, TheirIntervalsHold) {
   struct Case {
     const char* name;
@@ -136,21 +143,29 @@ TEST(SampledFrames, TheirIntervalsHold) {
       {"passes", in_passes, "agx-orin", "baseline"},
       {"a stencil that is preset", with_preset_stencil, "mobile", "baseline"},
       {"triangles", of_triangles, "agx-orin", "baseline"},
+      {"several GPCs", of_several_gpcs, "desktop", "qm"},
   };
+  unsigned inside = 0, runs = 0;
+  std::string outside;
   for (const Case& c : cases) {
     RunRequest request = request_of(c.variant);
     request.platform = &platform_named(c.platform);
     request.termination = c.termination;
     const Frame frame = c.frame(draw_state_of(request));
     const auto cycles = static_cast<double>(*run(request, frame).cycles);
-    for (const std::uint64_t seed : {1U, 2U}) {
+    for (const std::uint64_t seed : {1U, 2U, 3U}) {
       const RunResult result = run(sampled(request, seed), frame);
+      const double half = result.sampling->half_interval_percent;
       EXPECT_GE(result.sampling->windows, 18) << c.name << ": " << result.sampling->whole_because;
-      EXPECT_LE(result.sampling->half_interval_percent, 9) << c.name;
-      EXPECT_NEAR(100 * static_cast<double>(*result.cycles) / cycles, 100, result.sampling->half_interval_percent)
-          << c.name << ", seed " << seed;
+      EXPECT_LE(half, 9) << c.name;
+      const double off = 100 * (static_cast<double>(*result.cycles) / cycles - 1);
+      EXPECT_LE(std::fabs(off), 1.5 * half) << c.name << ", seed " << seed;
+      ++runs;
+      inside += std::fabs(off) <= half ? 1 : 0;
+      if (std::fabs(off) > half) outside += fmt::format(" {}, seed {}: {:+.2f} of {:.2f} %", c.name, seed, off, half);
     }
   }
+  EXPECT_GE(100 * inside, 95 * runs) << inside << " of " << runs << outside;
 }
 
 TEST(SampledFrames, DrawAndCountAsFunctional) {
