@@ -221,8 +221,8 @@ void print_summary(std::uint64_t seed, const std::vector<Scene>& scenes, const s
     return std::fabs(a.measured.error_percent) > std::fabs(b.measured.error_percent);
   });
   for (std::size_t i = 0; i < std::min(worst, found.size()); ++i)
-    std::printf("%+8.2f  --only %llu  %s\n", found[i].measured.error_percent,
-                static_cast<unsigned long long>(found[i].index),
+    std::printf("%+8.2f, says +-%4.1f  --only %llu  %s\n", found[i].measured.error_percent,
+                found[i].measured.expected_percent, static_cast<unsigned long long>(found[i].index),
                 describe(draw_case(seed, found[i].index, scenes, at_cycle)).c_str());
 }
 
