@@ -35,12 +35,11 @@ FrameProgress::FrameProgress(const Gpu& gpu) {
 void FrameProgress::add(const std::string& slot, const Behaviour& behaviour) {
   behaviours_.push_back(&behaviour.unit());
   for (const DrawCounter* const counter : behaviours_.back()->draw_counters()) {
-    if (slot == "raster" && counter->name() == std::string("quads_rasterized")) quads_of_draws_.push_back(counter);
+    if (slot == "raster" && counter->name() == std::string("quads_rasterized")) quads_.push_back(counter);
   }
   for (const Counter* const counter : behaviours_.back()->counters()) {
     const auto is = [&](const CounterName& name) { return slot == name.slot && counter->name() == name.name; };
     if (is({"draw", "splats"})) splats_.push_back(counter);
-    if (is({"raster", "quads_rasterized"})) quads_.push_back(counter);
     if (is({"raster", "setups"})) setups_.push_back(counter);
     if (is({"tgc", "entries"})) entries_.push_back(counter);
     for (std::size_t kind = 0; kind < work_names.size(); ++kind) {
@@ -49,15 +48,9 @@ void FrameProgress::add(const std::string& slot, const Behaviour& behaviour) {
   }
 }
 
-std::uint64_t FrameProgress::sum(const Counters& counters) {
-  std::uint64_t sum = 0;
-  for (const Counter* const counter : counters) sum += counter->value();
-  return sum;
-}
-
 std::uint64_t FrameProgress::rasterized_before(DrawIndex draw) const {
   std::uint64_t sum = 0;
-  for (const DrawCounter* const counter : quads_of_draws_) {
+  for (const DrawCounter* const counter : quads_) {
     const std::vector<std::uint64_t>& of_draw = counter->of_draw();
     sum = std::accumulate(of_draw.begin(), of_draw.begin() + draw, sum);
   }

@@ -36,10 +36,15 @@ class FrameProgress {
  private:
   using Counters = std::vector<const Counter*>;
   void add(const std::string& slot, const Behaviour& behaviour);
-  static std::uint64_t sum(const Counters& counters);
+  template <class AnyCounters>
+  static std::uint64_t sum(const AnyCounters& counters) {
+    std::uint64_t sum = 0;
+    for (const Counter* const counter : counters) sum += counter->value();
+    return sum;
+  }
   std::vector<const Behaviour*> behaviours_;
-  std::vector<const DrawCounter*> quads_of_draws_;
-  Counters splats_, quads_, setups_, entries_;
+  std::vector<const DrawCounter*> quads_;
+  Counters splats_, setups_, entries_;
   std::array<Counters, counted_work_kinds> work_;
 };
 

@@ -39,10 +39,10 @@ std::uint64_t retired(const Counts& counts) {
 
 }  // namespace
 
-SampledWindow::SampledWindow(const RunRequest& request, const Frame& part, Range range, const UntimedGpu& before,
+SampledWindow::SampledWindow(const RunRequest& request, const Frame& rest, Range range, const UntimedGpu& before,
                              Framebuffer& drawn)
     : range_(range),
-      configuration_(request, part, before.configuration()),
+      configuration_(request, rest, before.configuration()),
       gpu_(configuration_, drawn),
       progress_(gpu_) {
   for (const Gpu::Placed& placed : gpu_.units()) {

@@ -36,10 +36,10 @@ class SampledWindow {
   };
 
   /// @param request  at `cycle`
-  /// @param part     of the frame, from where it begins to warm up
-  /// @param before   has drawn what is before that; its memories' contents are copied
+  /// @param rest     the frame, gone on with from where it begins to warm up
+  /// @param before   has drawn what is before that; what its units and memories hold is copied
   /// @param drawn    by that; it is drawn on
-  SampledWindow(const RunRequest& request, const Frame& part, Range range, const UntimedGpu& before,
+  SampledWindow(const RunRequest& request, const Frame& rest, Range range, const UntimedGpu& before,
                 Framebuffer& drawn);
   /// Waits for it. Throws what the simulation throws.
   Measured result() { return measured_.get(); }

@@ -28,9 +28,15 @@ double quads_of(const Splat& splat, const Frame& frame) {
          share_on_screen(splat.cy, std::fabs(splat.ay) + std::fabs(splat.by), frame.height());
 }
 
+/// Above 0 where a mesh turns its back.
+double doubled_area_of(const ScreenTriangle& triangle) {
+  const auto& [x, y] = triangle;
+  return (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]);
+}
+
 double quads_of(const ScreenTriangle& triangle, const Frame& frame) {
   const auto& [x, y] = triangle;
-  const double area = std::fabs((x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])) / 2;
+  const double area = std::fabs(doubled_area_of(triangle)) / 2;
   double perimeter = 0;
   for (unsigned i = 0; i < 3; ++i) perimeter += std::hypot(x[(i + 1) % 3] - x[i], y[(i + 1) % 3] - y[i]);
   const auto [left, right] = std::minmax({x[0], x[1], x[2]});
@@ -46,7 +52,7 @@ double quads_of(const DrawCall& call, std::uint32_t number, const Frame& frame) 
   }
   const auto& [a, b, c] = call.mesh_triangle(number).vertices;
   const ScreenTriangle triangle{{a.x, b.x, c.x}, {a.y, b.y, c.y}};
-  const bool is_back = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y) > 0;
+  const bool is_back = doubled_area_of(triangle) > 0;
   const bool is_culled = call.state.cull != CullMode::none && is_back == (call.state.cull == CullMode::back);
   return is_culled ? 0 : quads_of(triangle, frame);
 }
@@ -82,7 +88,6 @@ WindowPlan::WindowPlan(const Frame& frame, const std::vector<double>& course, co
                    [](const Window& a, const Window& b) { return a.splat < b.splat; });
   windows_.insert(windows_.begin(), Window());
   windows_.push_back(window_at(end_));
-  for (const Change& change : taken_) changes_.push_back(change.draw);
 }
 
 double WindowPlan::share() const {
@@ -102,8 +107,7 @@ std::vector<WindowPlan::Change> WindowPlan::all_changes() const {
     }
     const DrawCall& call = frame_.draw_call(command.draw);
     if (call.splats == 0) continue;
-    if (before != nullptr && (is_cleared || !(*before == call.state)))
-      changes.push_back({command.draw, course_[call.base], before});
+    if (before != nullptr && (is_cleared || !(*before == call.state))) changes.push_back({command.draw, before});
     before = &call.state;
     is_cleared = false;
   }
@@ -115,15 +119,16 @@ WindowPlan::Ranges WindowPlan::take_changes() {
   Ranges about;
   const std::vector<Change> changes = all_changes();
   for (std::size_t first = 0, last = 0; first < changes.size(); first = last + 1) {
-    for (last = first; last + 1 < changes.size() && changes[last + 1].at - changes[last].at < 2 * half;) ++last;
-    const Change& change = changes[first];
-    const Range range{std::max(change.at - half, begin_), std::min(changes[last].at + half, end_)};
+    const auto at = [&](std::size_t change) { return begin_of(changes[change].draw); };
+    for (last = first; last + 1 < changes.size() && at(last + 1) - at(last) < 2 * half;) ++last;
+    const Range range{std::max(at(first) - half, begin_), std::min(at(last) + half, end_)};
     if (range.from >= range.to) continue;
     if (last > first) {
       group_of(nullptr, nullptr).ranges.push_back(range);
     } else if (range.to - range.from == 2 * half) {
-      group_of(change.before, &frame_.draw_call(change.draw).state).changes.push_back(change);
-      taken_.push_back(change);
+      const auto [draw, before] = changes[first];
+      group_of(before, &frame_.draw_call(draw).state).changes.push_back(draw);
+      changes_.push_back(draw);
     } else {
       continue;
     }
@@ -183,15 +188,15 @@ void WindowPlan::take_windows(std::size_t group) {
 }
 
 void WindowPlan::take_windows_at_changes(std::size_t group) {
-  const std::vector<Change>& changes = groups_[group].changes;
+  const std::vector<DrawIndex>& changes = groups_[group].changes;
   const std::size_t count = std::min<std::size_t>(changes.size(), std::max<std::uint64_t>(2, sizes_.strata / 8));
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t from = changes.size() * i / count, to = changes.size() * (i + 1) / count;
-    const Change& change = changes[from + static_cast<std::size_t>(random() * static_cast<double>(to - from))];
-    Window window = window_at(change.at - sizes_.measured / 2);
+    const DrawIndex draw = changes[from + static_cast<std::size_t>(random() * static_cast<double>(to - from))];
+    Window window = window_at(begin_of(draw) - sizes_.measured / 2);
     window.group = group;
-    window.around = change.draw;
-    for (std::size_t at = from; at < to; ++at) window.about_draws.push_back(changes[at].draw);
+    window.around = draw;
+    for (std::size_t at = from; at < to; ++at) window.about_draws.push_back(changes[at]);
     windows_.push_back(std::move(window));
   }
 }
@@ -211,10 +216,10 @@ WindowPlan::Window WindowPlan::window_at(double quads) const {
 /// The splat, and the part of it, before which so many quads are; where something about a change ends, the change.
 double WindowPlan::place_in_course(double quads) const {
   const double half = sizes_.measured / 2;
-  const auto change = std::lower_bound(taken_.begin(), taken_.end(), quads - sizes_.measured,
-                                       [](const Change& each, double at) { return each.at < at; });
-  for (auto each = change; each != taken_.end() && each->at <= quads + sizes_.measured; ++each) {
-    if (quads == each->at - half || quads == each->at + half) return frame_.draw_call(each->draw).base;
+  const auto change = std::lower_bound(changes_.begin(), changes_.end(), quads - sizes_.measured,
+                                       [&](DrawIndex draw, double at) { return begin_of(draw) < at; });
+  for (auto draw = change; draw != changes_.end() && begin_of(*draw) <= quads + sizes_.measured; ++draw) {
+    if (quads == begin_of(*draw) - half || quads == begin_of(*draw) + half) return frame_.draw_call(*draw).base;
   }
   const auto next = std::upper_bound(course_.begin(), course_.end(), quads);
   if (next == course_.end()) return static_cast<double>(course_.size() - 1);

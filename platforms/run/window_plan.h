@@ -62,14 +62,13 @@ class WindowPlan {
   /// A change of what is drawn.
   struct Change {
     DrawIndex draw;
-    double at;  ///< quads of the course
     const DrawState* before;
   };
   struct Group {
-    const DrawState *before,
-        *state;  ///< before is null where it is no change, both are where changes are near one another
+    const DrawState* before;  ///< null where it is no change
+    const DrawState* state;   ///< null where changes are near one another
     Ranges ranges;
-    std::vector<Change> changes;
+    std::vector<DrawIndex> changes;
   };
   std::vector<Change> all_changes() const;
   /// Takes those that nothing is near to, and returns what of the course they and the others are about.
@@ -80,6 +79,7 @@ class WindowPlan {
   void take_windows_at_changes(std::size_t group);
   Window window_at(double quads) const;
   double place_in_course(double quads) const;
+  double begin_of(DrawIndex draw) const { return course_[frame_.draw_call(draw).base]; }
   static double quads_in(const Ranges& ranges);
   static Ranges part_of(const Ranges& ranges, double from, double to);
   double random();  ///< in [0, 1)
@@ -91,8 +91,7 @@ class WindowPlan {
   std::uint64_t drawn_ = 0;
   std::vector<Group> groups_;
   std::vector<Window> windows_;
-  std::vector<Change> taken_;       ///< changes, in order
-  std::vector<DrawIndex> changes_;  ///< their draws
+  std::vector<DrawIndex> changes_;
 };
 
 }  // namespace vrpipe
