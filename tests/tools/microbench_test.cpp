@@ -94,8 +94,9 @@ TEST(MicrobenchFindings, SayHowFarAGroupIsOff) {
 }
 
 TEST(MeasuredTables, AreAllThere) {
-  const std::pair<const char*, std::size_t> tables[] = {
-      {"strips", 35}, {"equal_splats", 24}, {"same_place", 92}, {"tiles_in_turn", 140}, {"hot_squares", 6}};
+  const std::pair<const char*, std::size_t> tables[] = {{"strips", 35},      {"equal_splats", 24},
+                                                        {"same_place", 92},  {"tiles_in_turn", 140},
+                                                        {"hot_squares", 42}, {"scattered_rectangles", 36}};
   for (const auto& [name, rows] : tables) EXPECT_EQ(tools::measured_table(name).size(), rows) << name;
   const tools::MeasuredRow& row = tools::measured_table("strips").front();
   EXPECT_EQ(row.text("format"), "RGBA8");

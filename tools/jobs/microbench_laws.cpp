@@ -196,32 +196,56 @@ void measure_returning_lines(MicrobenchBench& bench) {
                        clk_of(slope), "rmtwice.json"});
   }
 
-  // These as they were measured, each with all its splats: pixels saturate.
-  const SplatMode modes[] = {{"killed", "splats in a square, killed", "RGBA16F", SplatsAre::killed},
-                             {"rgba8", "splats in a square, RGBA8", "RGBA8", SplatsAre::blended},
-                             {"rgba16f", "splats in a square, RGBA16F", "RGBA16F", SplatsAre::blended}};
-  std::vector<LawRow> squares;
-  for (const SplatMode& mode : modes) {
+  struct Mode {
+    const char *column, *name, *format;
+    BoxesAre boxes;
+    SplatsAre splats;
+  };
+  const Mode modes[] = {{"killed", "killed", "RGBA16F", BoxesAre::killed, SplatsAre::killed},
+                        {"rgba8", "RGBA8", "RGBA8", BoxesAre::blended, SplatsAre::blended},
+                        {"rgba16f", "RGBA16F", "RGBA16F", BoxesAre::blended, SplatsAre::blended}};
+  std::vector<LawRow> scattered, squares;
+  for (const Mode& mode : modes) {
+    const RunRequest request = of_format(bench, mode.format);
+    for (const MeasuredRow& row : measured_table("scattered_rectangles")) {
+      const unsigned side = row.count("side"), step = row.count("step"), region = row.count("region");
+      // Pixels do not saturate yet.
+      const MicrobenchSlope slope(bench, request, 4000, [=, what = mode.boxes](unsigned count) {
+        return microbench::scattered_boxes(side, step, region, count, what);
+      });
+      scattered.push_back({fmt::format("scattered rectangles, {}", mode.name),
+                           fmt::format("{0}x{0} at multiples of {1} in {2}x{2}", side, step, region),
+                           row.number(mode.column), clk_of(slope), "rmlad.json"});
+    }
+    // These as they were measured, each with all its splats: pixels saturate.
     for (const MeasuredRow& row : measured_table("hot_squares")) {
       const double half = row.number("half_axis");
       const unsigned region = row.count("region"), splats = row.count("splats");
-      const std::size_t frame = bench.add(of_format(bench, mode.format), [=, what = mode.what] {
+      const std::size_t frame = bench.add(request, [=, what = mode.splats] {
         return microbench::equal_splats(half, half, splat_opacity, splats, region, what);
       });
-      squares.push_back({mode.group, fmt::format("{0}x{0} in {1}x{1}", half, region), row.number(mode.column),
+      squares.push_back({fmt::format("splats in a square, {}", mode.name),
+                         fmt::format("{0}x{0} in {1}x{1}", half, region), row.number(mode.column),
                          [=, &bench] { return bench.cycles(frame) / splats; }, "rmhot.json"});
     }
   }
   bench.run();
   report(bench, in_turn, "clk a round");
+  report(bench, scattered, "clk a rectangle");
   report(bench, squares, "clk a splat");
   auto square = squares.begin();
-  for (const SplatMode& mode : modes) {
-    MicrobenchCurve curve{mode.group, "side of the square, pixels", "clk a splat", {}, {}, {}};
+  for (const Mode& mode : modes) {
+    MicrobenchCurve curve{fmt::format("splats of 4x4 in a square, {}", mode.name),
+                          "side of the square, pixels",
+                          "clk a splat",
+                          {},
+                          {},
+                          {}};
     for (const MeasuredRow& row : measured_table("hot_squares")) {
-      curve.measured.emplace_back(row.count("region"), square->clk());
-      curve.gpu.emplace_back(row.count("region"), square->gpu);
-      ++square;
+      const LawRow& splats = *square++;
+      if (row.count("half_axis") != 4) continue;
+      curve.measured.emplace_back(row.count("region"), splats.clk());
+      curve.gpu.emplace_back(row.count("region"), splats.gpu);
     }
     bench.curve(std::move(curve));
   }

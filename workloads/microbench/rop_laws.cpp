@@ -2,6 +2,7 @@
 #include <utility>
 #include <vector>
 
+#include <vrpipe/arithmetic/random.h>
 #include <vrpipe/workloads/measured_splats.h>
 #include <vrpipe/workloads/microbench.h>
 
@@ -67,6 +68,16 @@ FramePointer boxes_of_tiles(const std::vector<Box>& boxes, unsigned tiles, unsig
       all.push_back({box.x + screen_tile_pixels * tile.x, box.y + screen_tile_pixels * tile.y, box.width, box.height});
   }
   return boxes_in_turn(all, rounds, what);
+}
+
+FramePointer scattered_boxes(unsigned side, unsigned step, unsigned region, unsigned count, BoxesAre what) {
+  const unsigned places = (region - side) / step + 1;
+  std::vector<Box> boxes;
+  for (unsigned i = 0; i < count; ++i) {
+    const auto place = [&](unsigned draw) { return static_cast<unsigned>(mix(2 * i + draw) % places) * step; };
+    boxes.push_back({place(0), place(1), side, side});
+  }
+  return boxes_in_turn(boxes, 1, what);
 }
 
 FramePointer equal_splats(double a, double b, float opacity, unsigned count, unsigned region, SplatsAre what) {

@@ -93,6 +93,10 @@ FramePointer strips(unsigned width, unsigned height, unsigned cells, unsigned ro
 FramePointer boxes_of_tiles(const std::vector<Box>& boxes, unsigned tiles, unsigned rounds, BoxesAre what,
                             const GpcTiles& gpc);
 
+/// So many of `side` x `side` pixels, each anywhere in the upper left `region` x `region` pixels, at multiples of `step` pixels; the
+/// same ones each time.
+FramePointer scattered_boxes(unsigned side, unsigned step, unsigned region, unsigned count, BoxesAre what);
+
 /// What becomes of splats.
 enum class SplatsAre : std::uint8_t { blended, written, passed, killed };
 /// The first `count` of measured::equal_splats, in its image.
