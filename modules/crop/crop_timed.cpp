@@ -127,7 +127,7 @@ class TimedCrop : public TimedUnit {
     for (unsigned line = 0; line < cache_.count && !fetches_ahead; ++line) {
       if (cache_.lines[line].replaced) at = std::max(at, last_blend_of_[cache_.lines[line].line]);
     }
-    CycleInterval looked_up = look_ups_.take(port_open_from(at), quads);
+    CycleInterval looked_up = look_ups_.take(fetches_ahead ? first_look_from(at) : port_open_from(at), quads);
     looked_up.last = std::max(looked_up.last, has_places);
     Cycle there = looked_up.first + 1;
     Cycle asked = looked_up.first;
@@ -272,6 +272,15 @@ class TimedCrop : public TimedUnit {
     return uses_[(line.address - behaviour_->surface()->address(0)) / time_.cache.line_bytes];
   }
 
+  /// Where there are two.
+  Cycle first_look_from(Cycle at) {
+    at = std::max(at, look_ups_.next());
+    for (Cycle tried = never; tried != at;) {
+      tried = at;
+      at = port_open_from(stops_.first_look_from(at));
+    }
+    return at;
+  }
   /// In a queue, of a quad of a tile in the surface.
   unsigned places_of(const ShadedWarp& warp, unsigned index, std::size_t tile) {
     const QuadSectors& sectors = sectors_of(warp, index);
@@ -287,7 +296,10 @@ class TimedCrop : public TimedUnit {
         visits_.of(behaviour_->surface()->grid().place(warp.tile, 0), warp.first_primitive[index]);
     Cycle at = second_looks_.take(places > 0 ? queue_.free_from(looked_up, places) : looked_up, 1).first;
     Cycle there = at;
-    const TimedLineUses::Look look = uses_of(line).look_again(visit, sectors, time_.cache.sectors_of_a_half(), at);
+    const Cycle could_be = at;
+    const TimedLineUses::Look look =
+        uses_of(line).look_again(visit, sectors, LineVisits::whole_line, time_.cache.sectors_of_a_half(), at);
+    stops_.add(could_be, at);
     if (look.again != 0) {
       fetched_again_ += static_cast<unsigned>(__builtin_popcount(look.again));
       if (look.is_first) send(1, at);
@@ -326,8 +338,7 @@ class TimedCrop : public TimedUnit {
     for (unsigned i = 0; i < cache_.count; ++i) {
       const std::uint32_t line = cache_.lines[i].line;
       last_blend_of_[line] = at.last;
-      if (fetches_ahead)
-        uses_of(cache_.lines[i]).used(sectors_of(warp, from).sectors, time_.cache.sectors_of_a_half(), at.last);
+      if (fetches_ahead) uses_of(cache_.lines[i]).used(LineVisits::whole_line, at.last);
       if (dirty[i] != 0) behaviour_->make_dirty(line, dirty[i]);
     }
   }
@@ -391,6 +402,7 @@ class TimedCrop : public TimedUnit {
   std::vector<Cycle> last_blend_of_;  ///< by line of the cache: of a quad that needed it, or what it held before
   std::vector<TimedLineUses> uses_;   ///< by line of the surface, where tags are looked at twice
   VisitCounter visits_;
+  SecondLookStops stops_;
   SectoredCache* pinned_cache_ = nullptr;  ///< where lines of queued quads are pinned
   TimedPins pins_;
   unsigned signalled_ = 0;  ///< quads, in the last cycle with any

@@ -133,7 +133,7 @@ class CropUnit : public Unit {
   }
   [[gnu::noinline]] bool look_up_ahead(const ColorQuad& quad, std::uint64_t address, std::uint32_t sectors,
                                        std::size_t place) {
-    if (!port_is_open()) return false;
+    if (ahead_->is_stopped() || !port_is_open()) return false;
     bool fills = false;
     const LinesAhead::Stay stay = ahead_->look_up(address, sectors, blends(quad), fills);
     if (stay == LinesAhead::no_stay) return false;

@@ -18,8 +18,8 @@ namespace vrpipe {
 /// way than the cache holds. What it held is written back once the last of them has been.
 ///
 /// Tags are looked at twice. A first look asks for sectors at once; quads then wait, in order, for a second, where they stop for
-/// lines that come back (LineVisits). What was asked for while quads still waited to be blended into an earlier stay of the
-/// line is fetched again there; quads wait for that where the line comes back.
+/// lines that come back (LineVisits), and first looks with them. What was asked for while quads still waited to be blended into an
+/// earlier stay of the line is fetched again there; quads wait for that where the line comes back.
 class LinesAhead {
  public:
   /// A stay of a line in the cache, by number.
@@ -72,13 +72,11 @@ class LinesAhead {
   bool look_again(Stay number, std::uint32_t sectors, Visit visit) {
     State& stay = stays_[number];
     LineUses& uses = uses_[index(stay.address)];
-    if (stay.is_new) {
-      if (!uses.begin(stay.fetches_again ? sectors : 0, half_)) return false;
-      stay.is_new = false;
-    }
-    if (!uses.may_go(visit, sectors, half_)) return false;
+    if (stay.is_new) stay.is_new = !uses.begin(stay.fetches_again ? LineVisits::whole_line : 0);
+    is_stopped_ = stay.is_new || !uses.may_go(visit, sectors, half_);
+    if (is_stopped_) return false;
     bool is_first = false;
-    const std::uint32_t again = uses.go(sectors, half_, is_first);
+    const std::uint32_t again = uses.go(sectors, LineVisits::whole_line, is_first);
     if (!stay.fetches_again || again == 0) return true;
     stay.waits_again = uses.comes_back();
     if (is_first) ++moves_.flits;
@@ -89,6 +87,9 @@ class LinesAhead {
     });
     return true;
   }
+
+  /// Whether the last second look was, so that nothing is looked up for the first time.
+  bool is_stopped() const { return is_stopped_; }
 
   /// Takes the sectors that have come, and sends what waits for the memory port; true if there were any.
   bool advance() {
@@ -122,7 +123,7 @@ class LinesAhead {
   void blended(Stay number, std::uint32_t sectors, bool changed, Visit visit) {
     State& stay = stays_[number];
     if (changed) stay.dirty |= sectors;
-    uses_[index(stay.address)].used(visit, sectors, half_);
+    uses_[index(stay.address)].used(visit, LineVisits::whole_line);
     if (--stay.quads == 0 && stay.left) end(number);
   }
 
@@ -231,6 +232,7 @@ class LinesAhead {
   std::vector<LineUses> uses_;      ///< by line of the surface: of quads that were looked up twice
   Ring<Request> requests_;          ///< that the memory port has not taken yet
   CropTime::Moves moves_;
+  bool is_stopped_ = false;
 };
 
 }  // namespace vrpipe

@@ -27,6 +27,10 @@ class BeatLines {
     for (unsigned position = 0; position < positions_per_tile; ++position) {
       halves_of_line_[places_[position].line][half_of_block(position)] |= places_[position].sectors;
     }
+    for (Halves& halves : halves_of_line_) std::fill(std::remove(halves.begin(), halves.end(), 0U), halves.end(), 0U);
+    const Halves& first = halves_of_line_.front();
+    const auto halves = static_cast<unsigned>(first.size() - std::count(first.begin(), first.end(), 0U));
+    half_of_a_line_ = std::max(halves / 2, 2U);
   }
 
   /// Lines, in the order in which they are needed first.
@@ -59,18 +63,27 @@ class BeatLines {
     for (; quads != 0; quads &= quads - 1) some[count++] = beat.quads[static_cast<unsigned>(__builtin_ctz(quads))];
     find(beat.tile, some.data(), count, out);
   }
-  /// Flits that reading sectors of a line takes of which others are held: one for each half, 4x8 pixels, of an 8x8 block of
-  /// which none is (measured on a GH100 graphics GPC).
-  unsigned flits_of(std::uint64_t address, std::uint32_t read, std::uint32_t held) const {
-    unsigned flits = 0;
-    for (const std::uint32_t half : halves_of(address)) flits += (half & read) != 0 && (half & held) == 0 ? 1U : 0U;
-    return flits;
+  /// The halves, 4x8 pixels, of 8x8 blocks that a line has, a bit each: those with some of its sectors.
+  std::uint32_t halves_with(std::uint64_t address, std::uint32_t sectors) const {
+    std::uint32_t halves = 0, bit = 1;
+    for (const std::uint32_t half : halves_of(address)) {
+      halves |= (half & sectors) != 0 ? bit : 0U;
+      bit <<= 1U;
+    }
+    return halves;
   }
-  /// All sectors of the halves of blocks in which some are.
-  std::uint32_t in_halves(std::uint64_t address, std::uint32_t sectors) const {
-    std::uint32_t all = sectors;
-    for (const std::uint32_t half : halves_of(address)) all |= (half & sectors) != 0 ? half : 0;
-    return all;
+  /// Of these so many are half a line, at least a block.
+  unsigned half_of_a_line() const { return half_of_a_line_; }
+  /// All sectors of such halves.
+  std::uint32_t sectors_of(std::uint64_t address, std::uint32_t halves) const {
+    std::uint32_t sectors = 0;
+    for (; halves != 0; halves &= halves - 1) sectors |= halves_of(address)[__builtin_ctz(halves)];
+    return sectors;
+  }
+  /// Flits that reading sectors of a line takes of which others are held: one for each half of a block of which none is (measured
+  /// on a GH100 graphics GPC).
+  unsigned flits_of(std::uint64_t address, std::uint32_t read, std::uint32_t held) const {
+    return static_cast<unsigned>(__builtin_popcount(halves_with(address, read) & ~halves_with(address, held)));
   }
   /// Where a screen tile begins.
   std::uint64_t tile(TileId tile) const { return surface_.address(tile, 0); }
@@ -97,6 +110,7 @@ class BeatLines {
   const std::uint32_t bytes_per_tile_;
   const std::array<QuadSectors, positions_per_tile> places_;
   std::vector<Halves> halves_of_line_;  ///< of a tile
+  unsigned half_of_a_line_ = 0;
 };
 
 }  // namespace vrpipe

@@ -65,17 +65,20 @@ class TimedZCache {
   /// part of it, and the others go beside that; `begun`: its quads, or 0.
   Cycle turn(unsigned quads, unsigned begun, Cycle visible) {
     if (!timing_.fetches_ahead()) return early_.turn(quads, visible);
-    const Cycle at = lines_ahead_.free_from(visible, 1);
-    if (begun > 0) return early_.look_ups.take(begun, at);
-    early_.look_ups.hold(at);
-    return early_.look_ups.now();
+    BatchLimit& look_ups = early_.look_ups;
+    const Cycle at = std::max(lines_ahead_.free_from(visible, 1), next_first_look_);
+    if (begun > 0) return look_ups.take(begun, stops_.first_look_from(look_ups.free_from(begun, at)));
+    look_ups.hold(stops_.first_look_from(at));
+    return look_ups.now();
   }
   /// In its turn; `tested` follows.
   Times look_up(const QuadBeat& beat, Cycle turn, bool needs_stencil) {
     places_ = timing_.places_of(beat);
     if (!needs_stencil) return {turn, turn};
     Times times = look_up(beat, turn, early_);
-    if (timing_.fetches_ahead()) times.there = std::max(times.there, look_again(beat, times.at));
+    if (!timing_.fetches_ahead()) return times;
+    next_first_look_ = times.at + 1;
+    times.there = std::max(times.there, look_again(beat, times.at));
     return times;
   }
   void tested(bool needs_stencil, Cycle at) {
@@ -83,7 +86,7 @@ class TimedZCache {
     if (!timing_.fetches_ahead() || !needs_stencil) return;
     for (unsigned i = 0; i < needed_.count; ++i) {
       const BeatLines::Needed::Line& line = needed_.lines[i];
-      uses_[lines_->index(line.address)].used(lines_->in_halves(line.address, line.sectors), half(), at);
+      uses_[lines_->index(line.address)].used(lines_->halves_with(line.address, line.sectors), at);
     }
   }
   /// The same of quads to be tested late, which become visible in a cycle; `tested_late` follows.
@@ -227,12 +230,14 @@ class TimedZCache {
     Cycle there = at;
     for (unsigned i = 0; i < needed_.count; ++i) {
       const BeatLines::Needed::Line& needed = needed_.lines[i];
+      const Cycle could_be = at;
+      const std::uint32_t halves = lines_->halves_with(needed.address, needed.sectors);
       const TimedLineUses::Look look =
-          uses_[lines_->index(needed.address)].look_again(visit, lines_->in_halves(needed.address, needed.sectors),
-                                                          half(), at);
+          uses_[lines_->index(needed.address)].look_again(visit, halves, halves, lines_->half_of_a_line(), at);
+      stops_.add(could_be, at);
       LineAccess again;
       again.address = needed.address;
-      again.filled = look.comes_back ? needed.sectors & look.again : 0;
+      again.filled = look.comes_back ? needed.sectors & lines_->sectors_of(needed.address, look.again) : 0;
       if (again.filled == 0) continue;
       // First looks of later beats may be long before.
       if (const unsigned flits = flits_of(needed.address, again.filled, 0); flits > 0)
@@ -244,7 +249,6 @@ class TimedZCache {
     owe(at);
     return std::max(there, at);
   }
-  unsigned half() const { return timing_.organization.sectors_of_a_half(); }
   /// What reading sectors takes of the ROPs' port.
   unsigned flits_of(std::uint64_t line, std::uint32_t sectors, std::uint32_t held) const {
     return out_reads_.is_stub() ? 0 : lines_->flits_of(line, sectors, held);
@@ -291,7 +295,9 @@ class TimedZCache {
   SlotPool lines_ahead_;             ///< between two looks
   IssuePort second_looks_{1};
   VisitCounter visits_;
-  std::uint64_t owed_ = 0;  ///< sectors
+  SecondLookStops stops_;
+  Cycle next_first_look_ = 0;  ///< of which there is one in a cycle
+  std::uint64_t owed_ = 0;     ///< sectors
   Cycle owed_at_ = 0;
 };
 

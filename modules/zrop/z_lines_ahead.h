@@ -34,8 +34,8 @@ class ReadFlits {
 
 /// The z-cache at cycle where its tags run ahead of its data: what a test misses is read for it, and the line may go
 /// meanwhile. Tags are looked at twice, as CROP's are: a first look asks for what is missed, at once; beats then wait, in
-/// their order, for a second, where they stop for lines that come back, which are read again (LineVisits). A beat is here one
-/// primitive's, and halves of 8x8 blocks, 4x8 pixels, are what it asks for.
+/// their order, for a second, where they stop for lines that come back, which are read again (LineVisits), and first looks with
+/// them. A beat is here one primitive's, and halves of 8x8 blocks, 4x8 pixels, are what it asks for.
 class ZLinesAhead {
  public:
   /// All outlive it; `cleared` may be null.
@@ -46,7 +46,6 @@ class ZLinesAhead {
         cleared_(cleared),
         sectors_of_a_line_(timing.organization.sectors_of_a_line()),
         sector_bytes_(timing.organization.sector_bytes),
-        half_(timing.organization.sectors_of_a_half()),
         mshrs_(timing.mshrs),
         read_of_line_(timing.organization.lines()),
         uses_(lines.lines()) {}
@@ -86,12 +85,14 @@ class ZLinesAhead {
     again_begun_ = false;
     return true;
   }
+  /// Whether the last second look was, so that no beat is looked up for the first time.
+  bool is_stopped() const { return is_stopped_; }
   /// A beat that was looked up is tested.
   void used(const QuadBeat& beat, const Waits& waits) {
     BeatLines::Needed needed;
     lines_.find(beat.tile, beat.quads.data(), beat.count, needed);
     for (unsigned i = 0; i < needed.count; ++i) {
-      uses_[lines_.index(needed.lines[i].address)].used(waits.visit, needed_halves(needed.lines[i]), half_);
+      uses_[lines_.index(needed.lines[i].address)].used(waits.visit, halves_of(needed.lines[i]));
     }
   }
 
@@ -167,15 +168,14 @@ class ZLinesAhead {
     LineUses& uses = uses_[lines_.index(line.address)];
     const auto bit = static_cast<std::uint16_t>(1U << at_);
     if (left_again_ == 0) {
-      const std::uint32_t halves = needed_halves(line);
-      if ((waits.begins & bit) != 0) {
-        if (!uses.begin(halves, half_)) return false;
+      const std::uint32_t halves = halves_of(line);
+      if ((waits.begins & bit) != 0 && uses.begin(halves))
         waits.begins = static_cast<std::uint16_t>(waits.begins & ~bit);
-      }
-      if (!uses.may_go(waits.visit, halves, half_) || !flits_.has_room()) return false;
+      is_stopped_ = (waits.begins & bit) != 0 || !uses.may_go(waits.visit, halves, lines_.half_of_a_line());
+      if (is_stopped_ || !flits_.has_room()) return false;
       bool is_first = false;
-      const std::uint32_t lacking = uses.go(halves, half_, is_first);
-      left_again_ = uses.comes_back() ? lacking & line.sectors : 0;
+      const std::uint32_t lacking = uses.go(halves, halves, is_first);
+      left_again_ = uses.comes_back() ? lines_.sectors_of(line.address, lacking) & line.sectors : 0;
       flits_.read(line.address, left_again_, 0);
     }
     while (left_again_ != 0) {
@@ -188,9 +188,9 @@ class ZLinesAhead {
     return true;
   }
 
-  /// A visit asks for halves of blocks.
-  std::uint32_t needed_halves(const BeatLines::Needed::Line& line) const {
-    return lines_.in_halves(line.address, line.sectors);
+  /// What a visit asks for.
+  std::uint32_t halves_of(const BeatLines::Needed::Line& line) const {
+    return lines_.halves_with(line.address, line.sectors);
   }
   bool may_read() const { return filling_ < mshrs_ && port_.memory_is_available(); }
   /// Of some sectors, those that one access reads: as many as there are registers free.
@@ -210,7 +210,6 @@ class ZLinesAhead {
   ClearedSectors* const cleared_;
   const unsigned sectors_of_a_line_;
   const std::uint64_t sector_bytes_;
-  const unsigned half_;  ///< sectors of half a line
   const unsigned mshrs_;
   unsigned filling_ = 0;  ///< sectors
   // Reads of first looks are numbered from 1.
@@ -225,6 +224,7 @@ class ZLinesAhead {
   BeatLines::Needed needed_;
   unsigned at_ = 0;  ///< of the lines needed
   std::uint32_t left_again_ = 0;
+  bool is_stopped_ = false;
   std::vector<LineUses> uses_;  ///< by line of the surface: of beats that were looked up twice
 };
 

@@ -226,7 +226,7 @@ class ZPort {
 
   bool take_beats(StreamIn<QuadBeat>& in) {
     bool moved = false;
-    while (!waits_ && in.ready()) {
+    while (!waits_ && in.ready() && !(ahead_ && ahead_->is_stopped())) {
       const QuadBeat& beat = in.front();
       if (!beat_begun_ && !begin(beat)) break;
       for (; at_ < needed_.count; ++at_) {
@@ -248,10 +248,12 @@ class ZPort {
       }
       taken_ += part_.count;
       moved = true;
-      if (taken_ < beat.count) continue;
-      taken_ = 0;
-      waits_ = beat.mark != Mark::none && plan_.waits_at(beat.mark);
-      in.pop();
+      if (taken_ == beat.count) {
+        taken_ = 0;
+        waits_ = beat.mark != Mark::none && plan_.waits_at(beat.mark);
+        in.pop();
+      }
+      if (ahead_ && needed_.count > 0) break;  // one look in a cycle, as the second ones
     }
     return moved;
   }

@@ -88,15 +88,17 @@ TEST_P(CropPrices, ALineOfWhichOneSectorMovesTakesThreeFlits) {
 
 constexpr unsigned trip = 400;  ///< of a fill, cycles
 
-/// Cycles between the visits to `tiles` tiles, in turn, of a primitive for each of `positions`, a quad of it.
+/// Cycles between the visits to `tiles` tiles, in turn, of a primitive for each of the positions, a quad of it. `by_round`: these, in
+/// turn.
 double cycles_of_a_round(Fidelity fidelity, const RenderContext& context, unsigned tiles,
-                         const std::vector<unsigned>& positions = {0}) {
+                         const std::vector<std::vector<unsigned>>& by_round = {{0}}) {
   const auto cycles = [&](unsigned rounds) {
     TimedCropBench crop(fidelity, context, partition({{"fetch_ahead_quads", "512"}, {"port_backlog_flits", "512"}}),
                         trip);
     for (unsigned round = 0; round < rounds; ++round) {
       for (unsigned tile = 0; tile < tiles; ++tile) {
-        for (const unsigned position : positions) crop.quad({static_cast<std::uint16_t>(tile), 0}, position, 0.001F);
+        for (const unsigned position : by_round[round % by_round.size()])
+          crop.quad({static_cast<std::uint16_t>(tile), 0}, position, 0.001F);
         crop.flush();
       }
     }
@@ -118,13 +120,20 @@ TEST_P(CropPrices, ALineThatLeftAndComesBackIsFetchedOnceItsLastUseIsOver) {
 
 TEST_P(CropPrices, OfALineThatComesBackSectorsOfAHalfAreNotFetchedSideBySide) {
   const auto two_visits = [&](unsigned second) {
-    return cycles_of_a_round(GetParam(), context, 40, {0, in_memory_order(second)}) / trip;
+    return cycles_of_a_round(GetParam(), context, 40, {{0, in_memory_order(second)}}) / trip;
   };
   EXPECT_NEAR(two_visits(0), 1, 0.05) << "the same sector";
   EXPECT_GT(two_visits(1), 1.4) << "another of the same half";
   EXPECT_LT(two_visits(1), 2.1);
   EXPECT_NEAR(two_visits(4), 1, 0.05) << "one of the other half";
   EXPECT_NEAR(two_visits(8), 1, 0.05) << "one of another line";
+}
+
+TEST_P(CropPrices, ALineComesBackWhateverOfItIsStillToBeUsed) {
+  for (const unsigned other : {1U, 4U, 7U}) {
+    EXPECT_NEAR(cycles_of_a_round(GetParam(), context, 40, {{0}, {in_memory_order(other)}}), trip, 12) << other;
+  }
+  EXPECT_LT(cycles_of_a_round(GetParam(), context, 40, {{0}, {in_memory_order(8)}}), 0.7 * trip) << "another line";
 }
 
 TEST_P(CropPrices, QuadsOfAVisitAreFetchedSideBySide) {
@@ -139,7 +148,7 @@ TEST_P(CropPrices, QuadsOfAVisitAreFetchedSideBySide) {
   EXPECT_LT(static_cast<double>(crop.run()), 24 * 1.1 * trip);
 }
 
-TEST_P(CropPrices, AheadOfItsDataALineThatComesBackSoonIsFetchedTwice) {
+TEST_P(CropPrices, AheadOfItsDataALineThatStopsIsFetchedTwiceAndNothingBehindItMeanwhile) {
   const auto sectors_read = [&](unsigned tiles) {
     TimedCropBench crop(GetParam(), context, partition({{"fetch_ahead_quads", "512"}}), 400);
     for (unsigned round = 0; round < 4; ++round) {
@@ -152,8 +161,9 @@ TEST_P(CropPrices, AheadOfItsDataALineThatComesBackSoonIsFetchedTwice) {
     return crop.bench.unit().memory_bytes().read / 32;
   };
   EXPECT_EQ(sectors_read(32), 32U);
-  // Once for the first visit; for each other one ahead, and again behind what the visit before has written.
-  EXPECT_EQ(sectors_read(40), 40U * (1 + 3 * 2));
+  // Once for each visit; those at the front of each round but the first, which are looked at before the first one stops, again.
+  EXPECT_GE(sectors_read(40), 4 * 40U + 3);
+  EXPECT_LE(sectors_read(40), 4 * 40U + 3 * 4);
 }
 
 TEST_P(CropPrices, AheadOfItsDataMoreLinesAreUnderWayThanTheCacheHolds) {

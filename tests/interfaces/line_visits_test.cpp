@@ -45,31 +45,47 @@ TEST(LineVisits, TakeSectorsOfAVisitTogether) {
   EXPECT_EQ(line.lacking(0b0111), 0b0100U);
 }
 
-TEST(LineUses, OfOtherHalvesDoNotHoldTheFirstVisit) {
+TEST(LineUses, OfOtherPartsDoNotHoldTheFirstVisit) {
   LineUses line;
   bool is_first = false;
-  ASSERT_TRUE(line.begin(0b0001, half));
+  ASSERT_TRUE(line.begin(0b0010));
   ASSERT_TRUE(line.may_go(0, 0b0001, half));
-  line.go(0b0001, half, is_first);
-  EXPECT_FALSE(line.begin(0b0010, half));
-  EXPECT_TRUE(line.begin(0b0010'0000, half));
+  line.go(0b0001, 0b0010, is_first);
+  EXPECT_FALSE(line.begin(0b0010));
+  EXPECT_FALSE(line.begin(0b0110));
+  EXPECT_TRUE(line.begin(0b1101));
 }
 
 TEST(LineUses, OfALineThatNeedNotStopAskForNothingAgain) {
   LineUses line;
   bool is_first = false;
-  ASSERT_TRUE(line.begin(0b0001, half));
+  ASSERT_TRUE(line.begin(1));
   line.may_go(0, 0b0001, half);
-  line.go(0b0001, half, is_first);
-  line.used(0, 0b0001, half);
-  ASSERT_TRUE(line.begin(0b0001, half)) << "used in time, if after the first look";
+  line.go(0b0001, 1, is_first);
+  line.used(0, 1);
+  ASSERT_TRUE(line.begin(1)) << "used in time, if after the first look";
   EXPECT_FALSE(line.comes_back());
   line.may_go(1, 0b0001, half);
-  line.go(0b0001, half, is_first);
-  ASSERT_FALSE(line.begin(0b0001, half));
-  line.used(1, 0b0001, half);
-  ASSERT_TRUE(line.begin(0b0001, half));
+  line.go(0b0001, 1, is_first);
+  ASSERT_FALSE(line.begin(1));
+  line.used(1, 1);
+  ASSERT_TRUE(line.begin(1));
   EXPECT_TRUE(line.comes_back());
+}
+
+TEST(SecondLookStops, KeepFirstLooksBehindThem) {
+  SecondLookStops stops;
+  stops.add(10, 20);
+  stops.add(21, 21);
+  stops.add(21, 25);
+  stops.add(40, 50);
+  EXPECT_EQ(stops.first_look_from(9), 9U);
+  EXPECT_EQ(stops.first_look_from(10), 10U) << "before the second look of its cycle";
+  EXPECT_EQ(stops.first_look_from(11), 21U);
+  EXPECT_EQ(stops.first_look_from(22), 26U);
+  EXPECT_EQ(stops.first_look_from(60), 60U);
+  stops.add(70, 80);
+  EXPECT_EQ(stops.first_look_from(80), 81U);
 }
 
 /// What is looked at: a visit's sectors, and whether the line has come into its cache for that.
@@ -80,6 +96,12 @@ struct Look {
   Cycle first_look = 0;
 };
 constexpr Cycle trip = 50;
+/// Of two sectors each.
+std::uint32_t parts_of(std::uint32_t sectors) {
+  std::uint32_t parts = 0;
+  for (unsigned part = 0; part < 4; ++part) parts |= (sectors >> (2 * part) & 3U) != 0 ? 1U << part : 0U;
+  return parts;
+}
 
 /// Cycles of the second looks, of which there is one a cycle, what they ask for again, and of lines that come back, for which
 /// they wait. A use follows a trip later.
@@ -95,11 +117,11 @@ Outcome timed(const std::vector<Look>& all) {
   for (const Look& look : all) {
     if (look.comes) line.come(look.first_look, true);
     at = std::max(at, look.first_look + 1);
-    const TimedLineUses::Look found = line.look_again(look.visit, look.sectors, half, at);
+    const TimedLineUses::Look found = line.look_again(look.visit, look.sectors, parts_of(look.sectors), half, at);
     outcome.again.push_back(found.again);
     outcome.awaited.push_back(found.comes_back ? found.again : 0);
     outcome.looks.push_back(at);
-    line.used(look.sectors, half, at + trip);
+    line.used(parts_of(look.sectors), at + trip);
     ++at;
   }
   return outcome;
@@ -115,17 +137,17 @@ Outcome cycle_by_cycle(const std::vector<Look>& all) {
     const Look& look = all[outcome.looks.size()];
     for (; !uses.empty() && uses.front().first <= now; uses.pop_front()) {
       const Look& done = all[uses.front().second];
-      line.used(done.visit, done.sectors, half);
+      line.used(done.visit, parts_of(done.sectors));
     }
     if (now <= look.first_look) continue;
     if (look.comes && !has_come) {
-      if (!line.begin(look.sectors, half)) continue;
+      if (!line.begin(parts_of(look.sectors))) continue;
       has_come = true;
       asked_early = !outcome.looks.empty() && outcome.looks.back() + trip > look.first_look;
     }
     if (!line.may_go(look.visit, look.sectors, half)) continue;
     bool is_first = false;
-    const std::uint32_t lacking = line.go(look.sectors, half, is_first);
+    const std::uint32_t lacking = line.go(look.sectors, parts_of(look.sectors), is_first);
     outcome.again.push_back(asked_early ? lacking : 0);
     outcome.awaited.push_back(line.comes_back() ? lacking : 0);
     uses.emplace_back(now + trip, outcome.looks.size());

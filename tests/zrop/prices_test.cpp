@@ -162,7 +162,11 @@ class ZropPrices : public ::testing::TestWithParam<Fidelity> {
       reads = behind_reads(bench);
     }
     flits = 0;
-    for (std::size_t i = 0; port != nullptr && i < port->records().size(); ++i) flits += port->records()[i].item.flits;
+    flits_at.clear();
+    for (std::size_t i = 0; port != nullptr && i < port->records().size(); ++i) {
+      flits += port->records()[i].item.flits;
+      flits_at.push_back(port->records()[i].last);
+    }
     return last;
   }
   void close(Bench& bench, Cycle end) {
@@ -185,7 +189,8 @@ class ZropPrices : public ::testing::TestWithParam<Fidelity> {
   RenderContext context;
   std::uint64_t reads = 0;  ///< sectors, of the last run
   std::uint64_t flits = 0;  ///< of the same
-  double tests = 0;         ///< cycles of its own, of the same
+  std::vector<Cycle> flits_at;
+  double tests = 0;  ///< cycles of its own, of the same
   double block_cycles = 0;
 };
 
@@ -298,29 +303,57 @@ TEST_P(ZropPrices, AheadOfItsDataACycleHasTheQuadsOfOnePrimitiveInOneBeat) {
   EXPECT_NEAR(cycles_of({12, 12}), 3, 0.01) << "12, 4 and 8 quads";
 }
 
-TEST_P(ZropPrices, LinesThatComeBackTakeTrips) {
-  // A round of visits to tiles in turn, of a primitive for each of `positions`, a quad of it.
-  constexpr unsigned trip = 400;
-  const auto trips = [&](unsigned tiles, const std::vector<unsigned>& positions) {
+class ZropReturns : public ZropPrices {
+ protected:
+  static constexpr unsigned trip = 400;
+  using Positions = std::vector<unsigned>;
+  /// What a round of visits to tiles in turn takes, of a primitive for each of the positions, a quad of it. `by_round`: these, in turn.
+  double trips(unsigned tiles, const std::vector<Positions>& by_round) {
     const auto cycles = [&](unsigned rounds) {
       std::vector<Bin> bins;
+      std::uint32_t primitive = 0;
       for (unsigned i = 0; i < rounds * tiles; ++i) {
         Bin bin{{static_cast<std::uint16_t>(i % tiles), 0}, {}};
-        for (const unsigned position : positions)
-          bin.quads.push_back(quad_at(position, static_cast<std::uint32_t>(i * positions.size() + bin.quads.size())));
+        for (const unsigned position : by_round[i / tiles % by_round.size()])
+          bin.quads.push_back(quad_at(position, primitive++));
         bins.push_back(bin);
       }
       return static_cast<double>(run(bins, small_cache, true, trip));
     };
     return (cycles(24) - cycles(8)) / 16 / trip;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Fidelities, ZropReturns, ::testing::ValuesIn(testing::fidelities_with_time()),
+                         testing::name_of_fidelity);
+
+TEST_P(ZropReturns, TakeTrips) {
+  EXPECT_LT(trips(32, {{0}}), 0.2) << "held: nothing comes back";
+  for (const unsigned tiles : {33U, 64U, 96U}) EXPECT_NEAR(trips(tiles, {{0}}), 1, 0.03) << tiles;
+  EXPECT_NEAR(trips(40, {{0, 1}}), 1, 0.05) << "the same half of a block";
+  EXPECT_GT(trips(40, {{0, 2}}), 1.4) << "the other half";
+  EXPECT_LT(trips(40, {{0, 2}}), 2.1);
+  EXPECT_NEAR(trips(40, {{0, 4}}), 1, 0.05) << "another block of the line";
+  EXPECT_NEAR(trips(40, {{0, 32}}), 1, 0.05) << "another line";
+}
+
+TEST_P(ZropReturns, AreOfHalvesOfBlocks) {
+  EXPECT_NEAR(trips(40, {{0}, {1}}), 1, 0.05) << "the half that the round before needs";
+  EXPECT_LT(trips(40, {{0}, {2}}), 0.7) << "the other half";
+  EXPECT_LT(trips(40, {{0}, {4}}), 0.7) << "the other block";
+}
+
+TEST_P(ZropReturns, KeepWhatComesBehindThemFromBeingAskedFor) {
+  const auto flits_in_time = [&](std::uint16_t after_33_tiles) {
+    std::vector<Bin> bins;
+    for (std::uint16_t tile = 0; tile < 33; ++tile) bins.push_back({{tile, 0}, {quad_at(0, tile)}});
+    bins.push_back({{after_33_tiles, 0}, {quad_at(0, 33)}});
+    for (std::uint16_t tile = 40; tile < 70; ++tile) bins.push_back({{tile, 0}, {quad_at(0, tile)}});
+    run(bins, small_cache, true, trip);
+    return std::count_if(flits_at.begin(), flits_at.end(), [](Cycle at) { return at < trip; });
   };
-  EXPECT_LT(trips(32, {0}), 0.2) << "held: nothing comes back";
-  for (const unsigned tiles : {33U, 64U, 96U}) EXPECT_NEAR(trips(tiles, {0}), 1, 0.03) << tiles;
-  EXPECT_NEAR(trips(40, {0, 1}), 1, 0.05) << "the same half of a block";
-  EXPECT_GT(trips(40, {0, 2}), 1.4) << "the other half";
-  EXPECT_LT(trips(40, {0, 2}), 2.1);
-  EXPECT_NEAR(trips(40, {0, 4}), 1, 0.05) << "another block of the line";
-  EXPECT_NEAR(trips(40, {0, 32}), 1, 0.05) << "another line";
+  EXPECT_EQ(flits_in_time(99), 33 + 1 + 30);
+  EXPECT_LE(flits_in_time(0), 33 + 1 + 2) << "the first tile's line is still to be used";
 }
 
 }  // namespace
