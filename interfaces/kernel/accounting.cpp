@@ -35,9 +35,10 @@ const char* name_of(UnitState state) {
   return "";
 }
 
-void StateAccount::keep(Change change) {
-  changes_.push(change);
+void StateAccount::keep_change(UnitState state, Cycle now) {
+  changes_.push({state_, now});
   if (changes_.size() >= most_changes_) settle();
+  begin(state, now);
 }
 
 void StateAccount::settle() {

@@ -143,12 +143,7 @@ void ClockDomain::edge() {
     const Cycle end = std::min(present + cycles_per_activation_, stop_at_);
     for (Cycle cycle = present; !finished_ && cycle < end;) {
       if (cycle >= look_at_) look_at_ = look_(cycle);
-      // Mostly someone wants the very next cycle.
-      for (const Cycle until = std::min(end, look_at_); !finished_ && cycle < until;) {
-        const bool ticked = tick_order_.empty() ? tick_due(cycle) : tick_due_in_order(cycle);
-        if (ticked) ++edges_;
-        cycle = ticked ? cycle + 1 : next_edge();
-      }
+      cycle = tick_until(cycle, std::min(end, look_at_));
     }
     do next_ = next_edge();
     while (next_ == never && step_locals());
@@ -174,7 +169,7 @@ inline void ClockDomain::tick(Clocked& unit, Cycle cycle, Cycle& due) {
   due = std::min(due, next);
 }
 
-bool ClockDomain::tick_due(Cycle cycle) {
+inline bool ClockDomain::tick_due(Cycle cycle) {
   // A wake-up in this cycle is for a later one: who is due is known before any of them ticks.
   const std::size_t count = due_.size();
   const std::uint64_t active = take_due(due_.data(), std::min(at_a_time, count), cycle);
@@ -217,6 +212,16 @@ bool ClockDomain::tick_due_in_order(Cycle cycle) {
   now_ = cycle;
   for (const unsigned handle : active) tick(*units_[handle], cycle, due_[handle]);
   return true;
+}
+
+Cycle ClockDomain::tick_until(Cycle cycle, Cycle until) {
+  while (!finished_ && cycle < until) {
+    const bool ticked = tick_order_.empty() ? tick_due(cycle) : tick_due_in_order(cycle);
+    if (ticked) ++edges_;
+    // Mostly someone wants the very next cycle.
+    cycle = ticked ? cycle + 1 : next_edge();
+  }
+  return cycle;
 }
 
 void ClockDomain::wake_from_outside(unsigned handle, Cycle at) {

@@ -35,9 +35,8 @@ void LocalClock::advance(Cycle until) {
     cycle = next_edge();
     if (cycle >= until) return;
     in_edge_ = true;
-    tick_due(cycle);
+    tick_until(cycle, cycle + 1);
     in_edge_ = false;
-    ++edges_;
     rouse();
   }
 }

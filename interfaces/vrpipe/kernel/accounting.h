@@ -106,16 +106,16 @@ class StateAccount {
     Cycle until;
   };
   void change(UnitState state, Cycle now) {
-    if (observer_ != nullptr) observer_->entered(state, now);
-    if (changes_.empty() && now <= frame_end_->so_far()) {
-      charge(state_, now);
-    } else {
-      keep({state_, now});
-    }
-    state_ = state;
+    if (!changes_.empty() || now > frame_end_->so_far()) return keep_change(state, now);
+    charge(state_, now);
+    begin(state, now);
   }
   /// Until the draw is known to last as long.
-  void keep(Change change);
+  void keep_change(UnitState state, Cycle now);
+  void begin(UnitState state, Cycle now) {
+    state_ = state;
+    if (observer_ != nullptr) observer_->entered(state, now);
+  }
   void settle();
   void charge(UnitState state, Cycle until) {
     cycles_[static_cast<unsigned>(state)] += until - charged_;

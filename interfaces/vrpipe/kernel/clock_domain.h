@@ -165,6 +165,8 @@ class ClockDomain : public sc_core::sc_module {
   friend class LocalClock;
   void edge();
   bool step_locals();
+  /// Lets those come that are wanted from a cycle on and before `until`; returns the first cycle behind them.
+  Cycle tick_until(Cycle cycle, Cycle until);
   bool tick_due(Cycle cycle);
   void tick_active(std::uint64_t active, std::size_t first, Cycle cycle);
   bool take_further_due(Cycle cycle);
