@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <systemc>
@@ -240,10 +241,7 @@ class StreamOut : public OutEnd<Item> {
   /// Free places at the receiver, as known at the start of this cycle. For 0 of them the unit need not come back by
   /// itself: a credit wakes it, and so does the end of a random stall.
   unsigned credits() {
-    if (clock_.domain->now() > credit_cycle_) {
-      credits_ += pending_;
-      pending_ = 0;
-    }
+    if (pending_ > 0 && clock_.domain->now() > credit_cycle_) credits_ += std::exchange(pending_, 0);
     return this->limited_ ? limited_credits() : credits_;
   }
   /// The free places as they will be known in the next cycle; a rate or random stalls may leave less of them.
