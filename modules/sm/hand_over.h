@@ -16,7 +16,7 @@ namespace vrpipe {
 class HandOver {
  public:
   HandOver(const SmTime& time, const RenderContext& context) : context_(context), price_(time.hand_over) {}
-  bool is_on() const { return price_.is_on(); }
+  bool is_on() const { return is_on_; }
   /// In thousandths of a cycle.
   struct Price {
     std::uint64_t warp = 0;
@@ -93,6 +93,7 @@ class HandOver {
 
   const RenderContext& context_;
   const HandOverPrice price_;
+  const bool is_on_ = price_.is_on();
   Visit last_;
   ThousandthsPort warps_;
   ThousandthsPort visits_;

@@ -318,8 +318,8 @@ class SmUnit : public Unit {
   }
 
   bool choose_core(TileId tile) {
-    if (tile == last_tile_ && sent_to_core_ < time_.warps_to_one_core && !free_of_core_[core_].empty()) return true;
     if (free_slots_ == 0) return false;
+    if (tile == last_tile_ && sent_to_core_ < time_.warps_to_one_core && !free_of_core_[core_].empty()) return true;
     do {
       core_ = core_ + 1 == time_.cores ? 0 : core_ + 1;
     } while (free_of_core_[core_].empty());
@@ -406,7 +406,7 @@ class SmUnit : public Unit {
     release_slots(now);
     run_events(now);
     launch_fragments(now);
-    if (in_vertices_.ready() && vertex_count_ < time_.vertex_warps) launch_vertex_warp(now);
+    if (vertex_count_ < time_.vertex_warps && in_vertices_.ready()) launch_vertex_warp(now);
     if (fetches_) memory_.send([this](std::uint32_t turn) { flights_[fragment_slots_ + turn].done = true; });
     send();
 

@@ -31,7 +31,7 @@ class TcUnit : public Unit {
 
  private:
   using Flush = TcBehaviour::Flush;
-  bool has_room() const { return queued_ < queue_.size(); }
+  bool has_room() const { return queued_ < time_.flush_queue_bins; }
   Flush& next_place() { return queue_[first_ + queued_ - (first_ + queued_ < queue_.size() ? 0 : queue_.size())]; }
 
   bool collect(Cycle now) {
