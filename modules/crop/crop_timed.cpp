@@ -107,12 +107,12 @@ class TimedCrop : public TimedUnit {
     const unsigned quads = to - from;
     const ColorSurface& surface = *behaviour_->surface();
     const std::size_t tile = surface.grid().place(warp.tile, 0);
+    const QuadColor* const stored = &surface.quad(tile);
     for (unsigned i = from; i < to; ++i) {
-      const std::size_t place = tile + warp.position[i];
-      __builtin_prefetch(&surface.quad(place), 1);
+      __builtin_prefetch(&stored[warp.position[i]], 1);
       __builtin_prefetch(&warp.color[i]);
-      monitor_->prefetch(place);
     }
+    monitor_->prefetch_tile(tile);
     // Places in the queue, and lines that no queued quad needs.
     SlotPool& queue = fetches_ahead ? ahead_ : queue_;
     const unsigned places = fetches_ahead ? places_of(warp, from, tile) : quads;
@@ -132,6 +132,7 @@ class TimedCrop : public TimedUnit {
     Cycle there = looked_up.first + 1;
     Cycle asked = looked_up.first;
     for (unsigned line = 0, i = from; line < cache_.count; ++line) {
+      if (!cache_.lines[line].moves()) continue;
       while (cache_.place_of[sectors_of(warp, i).line] != line) ++i;  // the first that needs it
       asked = std::max(asked, looked_up.of_part(i - from, quads));
       there = std::max(there, move(cache_.lines[line], fetches_ahead, asked));
@@ -320,21 +321,14 @@ class TimedCrop : public TimedUnit {
     CropBehaviour::Outcomes outcomes;
     behaviour_->blend_quads(warp, from, to, outcomes);
     unsigned terminated = 0;
-    bool all_changed = true;
+    std::array<std::uint32_t, quads_per_warp> dirty{};  // by line
     for (unsigned i = from; i < to; ++i) {
       terminated |= outcomes[i].terminated;
-      all_changed &= outcomes[i].changed;
+      if (!outcomes[i].changed && !time_.writes_unchanged) continue;
+      const QuadSectors& quad = sectors_of(warp, i);
+      dirty[cache_.place_of[quad.line]] |= quad.sectors;
     }
     if (terminated != 0) signal(warp, from, to, outcomes, at);
-    std::array<std::uint32_t, quads_per_warp> dirty{};  // by line
-    if (all_changed || time_.writes_unchanged) {
-      for (unsigned line = 0; line < cache_.count; ++line) dirty[line] = cache_.lines[line].sectors;
-    } else {
-      for (unsigned i = from; i < to; ++i) {
-        const QuadSectors& quad = sectors_of(warp, i);
-        dirty[cache_.place_of[quad.line]] |= outcomes[i].changed ? quad.sectors : 0U;
-      }
-    }
     for (unsigned i = 0; i < cache_.count; ++i) {
       const std::uint32_t line = cache_.lines[i].line;
       last_blend_of_[line] = at.last;

@@ -41,9 +41,7 @@ class UntimedCrop : public UntimedUnit {
     const std::size_t tile = surface.grid().place(warp.tile, 0);
     const QuadColor* const quads = &surface.quad(tile);
     for (unsigned i = 0; i < warp.count; ++i) __builtin_prefetch(&quads[warp.quads[i].position], 1);
-    constexpr unsigned in_a_line = 16;  // of a host's cache
-    const BlendOrderMonitor& monitor = watch();
-    for (unsigned position = 0; position < positions_per_tile; position += in_a_line) monitor.prefetch(tile + position);
+    watch().prefetch_tile(tile);
   }
 
   void count_least(const BoundTerms& terms) override {

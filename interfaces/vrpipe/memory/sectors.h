@@ -74,6 +74,8 @@ struct LineAccess {
   bool spared = false;             ///< and it went instead of one that is kept
   std::uint64_t address = 0;       ///< of the line, bytes
   std::uint64_t old_address = 0;   ///< of what it held
+  /// Whether the line is new, or sectors of it are read.
+  bool moves() const { return replaced || filled != 0; }
 };
 
 }  // namespace vrpipe
