@@ -145,7 +145,7 @@ class CropTime {
     done_ += price_;
     last_blend_ = now;
   }
-  std::pair<Cycle, Cycle> blend_all(unsigned quads, Cycle ready) {
+  [[gnu::always_inline]] std::pair<Cycle, Cycle> blend_all(unsigned quads, Cycle ready) {
     const Cycle first = free_from(price(), ready);
     idle_until(first);
     done_ += quads * price_;

@@ -317,12 +317,13 @@ class TimedCrop : public TimedUnit {
 
   [[gnu::always_inline]] void blend(const ShadedWarp& warp, unsigned from, unsigned to, bool fetches_ahead,
                                     CycleInterval at) {
-    monitor_->blended(warp, from, to, at.last);
     CropBehaviour::Outcomes outcomes;
     behaviour_->blend_quads(warp, from, to, outcomes);
+    const std::size_t tile = behaviour_->surface()->grid().place(warp.tile, 0);
     unsigned terminated = 0;
     std::array<std::uint32_t, quads_per_warp> dirty{};  // by line
     for (unsigned i = from; i < to; ++i) {
+      monitor_->blended(tile + warp.position[i], warp, i, at.last);
       terminated |= outcomes[i].terminated;
       if (!outcomes[i].changed && !time_.writes_unchanged) continue;
       const QuadSectors& quad = sectors_of(warp, i);

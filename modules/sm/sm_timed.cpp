@@ -138,6 +138,20 @@ class TimedSm : public TimedUnit {
     return free_slots_ > 0 || (!releases_.empty() && releases_.front().at <= cycle);
   }
 
+  /// Until the first slot is released, by what is done before it, too.
+  [[gnu::noinline]] void wait_for_slot(Cycle launch) {
+    for (Cycle next = next_event(); !has_slot_before(next); next = next_event()) {
+      in_release_.ask(next);
+      if (has_slot_before(next) || next == never) break;
+      hand_on_until(next);
+    }
+    // What PROP has sent to be tested late may be in a unit at cycle.
+    clock.domain->wait_until([this] { return has_slot(); });
+    if (!has_slot()) {
+      throw SimulationFault("deadlock", launch, std::string(name()) + " has warps to launch, and no slot is released");
+    }
+  }
+
   /// Puts a slot of the next core that has one under a warp, from `at` on or as soon as one is released.
   Cycle take_slot(TileId tile, Cycle at) {
     if (free_slots_ == 0) at = std::max(at, releases_.front().at);
@@ -180,18 +194,8 @@ class TimedSm : public TimedUnit {
       hand_on_until(launch);
       in_release_.ask(launch);
     }
-    // The first slot that is released, by what is done before it, too.
-    for (Cycle next = next_event(); !has_slot_before(next); next = next_event()) {
-      in_release_.ask(next);
-      if (has_slot_before(next) || next == never) break;
-      hand_on_until(next);
-    }
-    // What PROP has sent to be tested late may be in a unit at cycle.
-    clock.domain->wait_until([this] { return has_slot(); });
-    if (!has_slot()) {
-      throw SimulationFault("deadlock", launch, std::string(name()) + " has warps to launch, and no slot is released");
-    }
-    launch = take_slot(warp.tile, hand_over_.free_from(launch));
+    if (!has_slot_before(next_event())) wait_for_slot(launch);
+    launch = take_slot(warp.tile, hand_over_.is_on() ? hand_over_.free_from(launch) : launch);
     charge(UnitState::blocked, launch);
     while (next_vertex_event() <= launch) do_vertex_event();
     Cycle there = 0;
@@ -306,7 +310,7 @@ class TimedSm : public TimedUnit {
     }
   }
 
-  void shade(const Warp& warp, std::uint32_t core, Cycle done) {
+  [[gnu::always_inline]] void shade(const Warp& warp, std::uint32_t core, Cycle done) {
     ShadedWarp& shaded = pool_.take();
     if (warp.mark != Mark::none) {
       shaded.mark = warp.mark;

@@ -87,9 +87,11 @@ class ThroughputPort {
     if (parts == 0) return cycle_;
     const Cycle first = next();
     used_ += parts;
-    const std::uint64_t cycles = per_cycle_.quotient(used_ - 1);
-    cycle_ += cycles;
-    used_ -= cycles * per_cycle_.value();
+    if (used_ > per_cycle_.value()) {
+      const std::uint64_t cycles = per_cycle_.quotient(used_ - 1);
+      cycle_ += cycles;
+      used_ -= cycles * per_cycle_.value();
+    }
     return {first, cycle_};
   }
   /// Nothing goes before this cycle any more.
@@ -182,7 +184,8 @@ class TimedOut : public OutEnd<Item> {
   /// Sends an item whose parts are there in the cycles `at`, and which takes the link for so many. `joins`: its first part
   /// goes with the last one of the item before it, beside which it takes the link; with 0 beats all of it. Returns the cycles in
   /// which it is taken.
-  CycleInterval send(const Item& item, CycleInterval at, unsigned beats = 1, bool joins = false) {
+  [[gnu::always_inline]] CycleInterval send(const Item& item, CycleInterval at, unsigned beats = 1,
+                                            bool joins = false) {
     if (this->limited_) at = limited(at, beats, joins);
     ++this->transferred_;
     at = direct_ != nullptr ? direct_->offer(item, at, beats, joins, this->pipeline_.cycles)
@@ -332,7 +335,7 @@ class TimedIn : public InEnd<Item> {
  private:
   friend class TimedOut<Item>;
 
-  CycleInterval visible(CycleInterval at, Cycle pipeline) const {
+  [[gnu::always_inline]] CycleInterval visible(CycleInterval at, Cycle pipeline) const {
     const Cycle latency = latency_ + pipeline;
     CycleInterval span(at.first + latency, at.last + latency);
     for (; this->stalled_at(span.first); ++span.first) span.last = std::max(span.last, span.first + 1);
@@ -346,7 +349,8 @@ class TimedIn : public InEnd<Item> {
     payload.last = taken.last;
   }
   /// Takes an item; returns when.
-  CycleInterval offer(const Item& item, CycleInterval at, unsigned beats, bool joins, Cycle pipeline) {
+  [[gnu::always_inline]] CycleInterval offer(const Item& item, CycleInterval at, unsigned beats, bool joins,
+                                             Cycle pipeline) {
     if (take_) return offer_parts(item, at, beats, pipeline);
     std::size_t place = place_;
     if (beats == 0) {
