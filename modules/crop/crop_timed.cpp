@@ -22,6 +22,8 @@ namespace {
 /// the cache is small, its quads go one by one.
 /// Ports: in_color (ShadedWarpItem), in_reads (PortReads; optional), out_terminations (TerminationBeat), out_done (BlendsDone; optional), memory (TLM-2.0
 /// base protocol).
+/// `Plain`: a run of quads that are alike, without a port, and with lines that neither go ahead nor are pinned.
+template <bool Plain>
 class TimedCrop : public TimedUnit {
  public:
   TimedCrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<CropBehaviour> behaviour,
@@ -86,24 +88,26 @@ class TimedCrop : public TimedUnit {
       behaviour_->pass(warp.mark);
       if (barriers_.is_barrier(warp.mark)) out_done_.send({warp.mark}, std::max(visible.first, time_.last_blend()));
     } else if (at_once_ >= warp.count && out_.room_from() <= visible.first) {
-      left = at_once_ > 1 ? pass<true>(warp, 0, warp.count, visible) : pass<false>(warp, 0, warp.count, visible);
+      left = pass(warp, 0, warp.count, visible);
     } else {
-      left.first = never;
-      for (unsigned i = 0; i < warp.count; ++i) {
-        const CycleInterval at = pass<false>(warp, i, i + 1, visible.of_part(i, warp.count));
-        left.first = std::min(left.first, at.first);
-        left.last = at.last;
-      }
+      left = pass_one_by_one(warp, visible);
     }
     warp.release();
     return left;
   }
+  [[gnu::noinline]] CycleInterval pass_one_by_one(const ShadedWarp& warp, CycleInterval visible) {
+    CycleInterval left = never;
+    for (unsigned i = 0; i < warp.count; ++i) {
+      const CycleInterval at = pass(warp, i, i + 1, visible.of_part(i, warp.count));
+      left.first = std::min(left.first, at.first);
+      left.last = at.last;
+    }
+    return left;
+  }
 
-  /// Looks quads of a warp up and blends them; returns the cycles of the look-ups. Where it is taken whole, there are no second
-  /// looks.
-  template <bool Whole>
-  CycleInterval pass(const ShadedWarp& warp, unsigned from, unsigned to, CycleInterval visible) {
-    const bool fetches_ahead = !Whole && time_.fetches_ahead();
+  /// Looks quads of a warp up and blends them; returns the cycles of the look-ups.
+  [[gnu::always_inline]] CycleInterval pass(const ShadedWarp& warp, unsigned from, unsigned to, CycleInterval visible) {
+    const bool fetches_ahead = !Plain && time_.fetches_ahead();
     const unsigned quads = to - from;
     const ColorSurface& surface = *behaviour_->surface();
     const std::size_t tile = surface.grid().place(warp.tile, 0);
@@ -118,7 +122,7 @@ class TimedCrop : public TimedUnit {
     const unsigned places = fetches_ahead ? places_of(warp, from, tile) : quads;
     Cycle at = places > 0 ? queue.free_from(visible.first, 1) : visible.first;
     const Cycle has_places = places > 0 ? queue.free_from(std::max(at, visible.last), places) : visible.last;
-    if (pinned_cache_ != nullptr) {
+    if (pins_lines()) {
       const std::uint64_t line = sectors_of(warp, from).line;
       const std::uint64_t address = surface.address(tile) + line * time_.cache.line_bytes;
       at = pins_.line_free_from(*pinned_cache_, address, port_open_from(std::max(at, look_ups_.next())));
@@ -139,12 +143,12 @@ class TimedCrop : public TimedUnit {
     }
     looked_up.last = std::max(looked_up.last, asked);
     look_ups_.hold(looked_up.last);
-    if (time_.port.is_on()) {
+    if (has_port()) {
       send(time_.flits_of_reads(warp, from, to, cache_, *behaviour_->surface()), looked_up.last);
       there = std::max(there, time_.port.open_from(there));
     } else if (const unsigned moved = memory_.take_moved(); moved > 0) {
       // Beside a quad of several cycles a sector may take nothing, so that each counts from its own time.
-      time_.quads_are_alike() ? moves_.push({looked_up.last, moved}) : move_for_quads(warp, from, to, looked_up, moved);
+      quads_are_alike() ? moves_.push({looked_up.last, moved}) : move_for_quads(warp, from, to, looked_up, moved);
     }
 
     if (fetches_ahead) there = std::max(there, look_again(warp, from, looked_up.last, places));
@@ -159,7 +163,7 @@ class TimedCrop : public TimedUnit {
     charge(UnitState::memory, blended.first);
     charge(UnitState::busy, blended.last + 1);
     if (places > 0) queue_.take(places, blended);
-    if (pinned_cache_ != nullptr) pins_.pin(*pinned_cache_, cache_.lines[0].line, blended.last);
+    if (pins_lines()) pins_.pin(*pinned_cache_, cache_.lines[0].line, blended.last);
     any_blended_ = true;
     quads_last(blended.last + time_.latency_cycles, quads, [&](unsigned i) { return warp.draw[from + i]; });
     did(CropWork::blend, quads, blended.first, blended.last + 1);
@@ -167,6 +171,9 @@ class TimedCrop : public TimedUnit {
     return looked_up;
   }
 
+  bool has_port() const { return !Plain && time_.port.is_on(); }
+  bool pins_lines() const { return !Plain && pinned_cache_ != nullptr; }
+  bool quads_are_alike() const { return Plain || time_.quads_are_alike(); }
   /// Whether a quad is blended in the cycle of the last that signalled, from one on, so that its signal would go with it.
   bool joins_signals(Cycle there) const {
     return signalled_ < TerminationBeat::capacity && time_.free_from(time_.price(), there) == signalled_at_;
@@ -190,7 +197,7 @@ class TimedCrop : public TimedUnit {
   /// Takes the time of quads whose sectors are there from a cycle on.
   [[gnu::always_inline]] CycleInterval blend_in_turn(const ShadedWarp& warp, unsigned from, unsigned to, Cycle there) {
     // What moves takes time from blending, from when it does, and what ZROP reads.
-    for (; !reads_.empty() && reads_.front().at <= time_.free_from(time_.price(), there); reads_.pop()) {
+    for (; has_port() && !reads_.empty() && reads_.front().at <= time_.free_from(time_.price(), there); reads_.pop()) {
       const Sent& read = reads_.front();
       time_.rest(read.flits, read.at);
       did(CropWork::reads, read.flits, read.at);
@@ -199,7 +206,7 @@ class TimedCrop : public TimedUnit {
       const Move& move = moves_.front();
       if (time_.move(move.sectors, move.at)) did(CropWork::sectors, move.sectors, move.at);
     }
-    if (time_.quads_are_alike()) {
+    if (quads_are_alike()) {
       const auto [first, last] = time_.blend_all(to - from, there);
       return {first, last};
     }
@@ -239,7 +246,7 @@ class TimedCrop : public TimedUnit {
   /// From when on the port takes more, by what was sent before: lines are written back when quads are blended, which is long
   /// after the look-ups of those behind them. What ZROP reads for quads that come later is known late.
   Cycle port_open_from(Cycle at) {
-    while (time_.port.is_on()) {
+    while (has_port()) {
       for (; !sent_.empty() && sent_.front().at <= at; sent_.pop())
         sent_before_.take(sent_.front().flits, sent_.front().at, clock.domain->now());
       const Cycle open = sent_before_.open_from(at);
@@ -249,7 +256,7 @@ class TimedCrop : public TimedUnit {
     return at;
   }
   void send(unsigned flits, Cycle at) {
-    if (flits == 0 || !time_.port.is_on()) return;
+    if (flits == 0 || !has_port()) return;
     const auto [from, until] = time_.port.take(flits, at);
     sent_.push_in_order({at, flits}, &Sent::at);
     did(CropWork::flits, flits, from, until);
@@ -415,9 +422,13 @@ class TimedCrop : public TimedUnit {
                                const RenderContext& context, unsigned) -> std::unique_ptr<Unit> {
                               if (blends_in_shader(*behaviour))
                                 return make_timed_in_shader_unit(name, domain, std::move(behaviour), context);
-                              return std::make_unique<TimedCrop>(name.c_str(), domain,
-                                                                 behaviour_as<CropBehaviour>(std::move(behaviour)),
-                                                                 context);
+                              auto crop = behaviour_as<CropBehaviour>(std::move(behaviour));
+                              const bool is_plain =
+                                  crop->time().is_plain() && !TimedPins::are_needed(crop->time().cache.replacement);
+                              if (is_plain)
+                                return std::make_unique<TimedCrop<true>>(name.c_str(), domain, std::move(crop),
+                                                                         context);
+                              return std::make_unique<TimedCrop<false>>(name.c_str(), domain, std::move(crop), context);
                             });
   return true;
 }();

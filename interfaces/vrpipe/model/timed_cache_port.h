@@ -30,7 +30,7 @@ class TimedCachePort {
   /// Reads the sectors that a line does without, from `at` on, which becomes the cycle in which the last is asked for.
   /// Returns when that is there; `filled(first, count, cycle)` says so of all.
   template <class Filled>
-  Cycle fill(const LineAccess& access, Cycle& at, Filled&& filled) {
+  [[gnu::always_inline]] Cycle fill(const LineAccess& access, Cycle& at, Filled&& filled) {
     Cycle there = 0;
     // An access takes as many registers as are free, like CachePort's.
     for (std::uint32_t missing = access.filled; missing != 0;) {
@@ -42,7 +42,7 @@ class TimedCachePort {
     }
     return there;
   }
-  Cycle fill(const LineAccess& access, Cycle& at) {
+  [[gnu::always_inline]] Cycle fill(const LineAccess& access, Cycle& at) {
     return fill(access, at, [](unsigned, unsigned, Cycle) {});
   }
   /// The same without registers, in a cycle that may be later than those of the next.
