@@ -61,13 +61,18 @@ FramePointer strips(unsigned width, unsigned height, unsigned cells, unsigned ro
 }
 
 FramePointer boxes_of_tiles(const std::vector<Box>& boxes, unsigned tiles, unsigned rounds, BoxesAre what,
-                            const GpcTiles& gpc) {
+                            const GpcTiles& gpc, unsigned of_the_first) {
   std::vector<Box> all;
-  for (const TileId tile : tiles_of(gpc, tiles)) {
-    for (const Box& box : boxes)
-      all.push_back({box.x + screen_tile_pixels * tile.x, box.y + screen_tile_pixels * tile.y, box.width, box.height});
-  }
-  return boxes_in_turn(all, rounds, what);
+  const auto add_round = [&](std::size_t count) {
+    for (const TileId tile : tiles_of(gpc, tiles)) {
+      const unsigned x = screen_tile_pixels * tile.x, y = screen_tile_pixels * tile.y;
+      for (std::size_t i = 0; i < count; ++i)
+        all.push_back({x + boxes[i].x, y + boxes[i].y, boxes[i].width, boxes[i].height});
+    }
+  };
+  for (unsigned i = 0; i < of_the_first; ++i) add_round(1);
+  for (unsigned i = 0; i < rounds; ++i) add_round(boxes.size());
+  return boxes_in_turn(all, 1, what);
 }
 
 FramePointer scattered_boxes(unsigned side, unsigned step, unsigned region, unsigned count, BoxesAre what) {

@@ -89,9 +89,10 @@ enum class BoxesAre : std::uint8_t {
 FramePointer boxes_in_turn(const std::vector<Box>& boxes, unsigned rounds, BoxesAre what);
 /// `rounds` times one of width x height pixels in each of so many cells of whole screen tiles.
 FramePointer strips(unsigned width, unsigned height, unsigned cells, unsigned rounds, BoxesAre what);
-/// `rounds` times these boxes, each within a screen tile, in each of `tiles` screen tiles in turn.
+/// `rounds` times these boxes, each within a screen tile, in each of `tiles` screen tiles in turn, behind so many rounds of the first
+/// of them alone.
 FramePointer boxes_of_tiles(const std::vector<Box>& boxes, unsigned tiles, unsigned rounds, BoxesAre what,
-                            const GpcTiles& gpc);
+                            const GpcTiles& gpc, unsigned of_the_first = 0);
 
 /// So many of `side` x `side` pixels, each anywhere in the upper left `region` x `region` pixels, at multiples of `step` pixels; the
 /// same ones each time.
