@@ -29,7 +29,7 @@ class BeatLines {
     }
     for (Halves& halves : halves_of_line_) std::fill(std::remove(halves.begin(), halves.end(), 0U), halves.end(), 0U);
     const Halves& first = halves_of_line_.front();
-    const auto halves = static_cast<unsigned>(first.size() - std::count(first.begin(), first.end(), 0U));
+    const auto halves = static_cast<unsigned>(std::find(first.begin(), first.end(), 0U) - first.begin());
     half_of_a_line_ = std::max(halves / 2, 2U);
   }
 
@@ -77,7 +77,8 @@ class BeatLines {
   /// All sectors of such halves.
   std::uint32_t sectors_of(std::uint64_t address, std::uint32_t halves) const {
     std::uint32_t sectors = 0;
-    for (; halves != 0; halves &= halves - 1) sectors |= halves_of(address)[__builtin_ctz(halves)];
+    for (; halves != 0; halves &= halves - 1)
+      sectors |= halves_of(address)[static_cast<unsigned>(__builtin_ctz(halves))];
     return sectors;
   }
   /// Flits that reading sectors of a line takes of which others are held: one for each half of a block of which none is (measured

@@ -78,7 +78,8 @@ rc::Gen<Setting> setting() {
 }
 
 TEST(Bound, LetsQuadsShareTheLastCycleOfABlock) {
-  // Splats that stencil kills, over each other. Of a block's bins the first pays, the others come in what that leaves.
+  // Splats that stencil kills, over each other, without lines that come back. Of a block's bins the first pays, the others come in what that
+  // leaves.
   std::vector<Splat> splats;
   for (unsigned y = 0; y + 16 <= 256; y += 8) {
     for (unsigned x = 0; x + 16 <= 256; x += 8) {
@@ -89,7 +90,10 @@ TEST(Bound, LetsQuadsShareTheLastCycleOfABlock) {
   }
   RunRequest r = request(variant_named("baseline"), ColorFormat::rgba8, Fidelity::bound);
   r.platform = &platform_named("gh100-gpc");
-  r.settings = {{"tc", "bin_quads", "4"}, {"zrop", "block_cycles", "1.9"}, {"zrop", "input_halves", "0"}};
+  r.settings = {{"tc", "bin_quads", "4"},
+                {"zrop", "block_cycles", "1.9"},
+                {"zrop", "input_halves", "0"},
+                {"zrop", "fetch_ahead_lines", "0"}};
   Frame frame(256, 256);
   DrawState state = draw_state_of(r);
   state.stencil.test = true;

@@ -91,7 +91,8 @@ class LineUses {
   /// Whether the first visit since the line came need not stop; it has come if so.
   bool begin(std::uint32_t parts) {
     bool is_held = false;
-    for (std::uint32_t left = parts; left != 0; left &= left - 1) is_held |= of_part_[__builtin_ctz(left)] > 0;
+    for (std::uint32_t left = parts; left != 0; left &= left - 1)
+      is_held |= of_part_[static_cast<unsigned>(__builtin_ctz(left))] > 0;
     stopped_ |= is_held;
     if (is_held) return false;
     visits_.begin(std::exchange(stopped_, false));
@@ -118,7 +119,7 @@ class LineUses {
  private:
   void count(std::uint32_t parts, std::uint32_t more) {
     all_ += more;
-    for (; parts != 0; parts &= parts - 1) of_part_[__builtin_ctz(parts)] += more;
+    for (; parts != 0; parts &= parts - 1) of_part_[static_cast<unsigned>(__builtin_ctz(parts))] += more;
   }
 
   LineVisits visits_;
@@ -147,7 +148,8 @@ class TimedLineUses {
     if (std::exchange(is_new_, false)) {
       asked_early_ = used_ > asked_at_;
       Cycle held = 0;
-      for (; asked_early_ && parts != 0; parts &= parts - 1) held = std::max(held, used_by_part_[__builtin_ctz(parts)]);
+      for (; asked_early_ && parts != 0; parts &= parts - 1)
+        held = std::max(held, used_by_part_[static_cast<unsigned>(__builtin_ctz(parts))]);
       visits_.begin(held > at);
       at = std::max(at, held);
     }
@@ -161,7 +163,7 @@ class TimedLineUses {
   /// In cycle `at`, which does not go back.
   void used(std::uint32_t parts, Cycle at) {
     used_ = at;
-    for (; parts != 0; parts &= parts - 1) used_by_part_[__builtin_ctz(parts)] = at;
+    for (; parts != 0; parts &= parts - 1) used_by_part_[static_cast<unsigned>(__builtin_ctz(parts))] = at;
   }
 
  private:
