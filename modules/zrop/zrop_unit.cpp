@@ -228,7 +228,7 @@ class ZropUnit : public Unit {
     }
     if (now < free_at_) {
       enter(UnitState::busy, now);
-      return free_at_;
+      return std::min(free_at_, in_terminations_.next_ready());
     }
     if (tests_late_) return wait(now);
     if (in_.ready()) {

@@ -83,6 +83,22 @@ TEST_F(ZropUnitTest, ACycleWithAnUpdateTestsNothing) {
   }
 }
 
+TEST_F(ZropUnitTest, AnUpdateThatComesDuringAWideTestIsAppliedThen) {
+  // Both beats are there from cycle 11 on, and the first is tested until 26; the update has been on its way since before.
+  const auto cycle_of_second = [&](bool updates) {
+    Bench bench("zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"quads_per_cycle", "1"}});
+    Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 8);
+    Source<TerminationBeat>& terminations = bench.source<TerminationBeat>("in_terminations", 4, 10);
+    Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 8);
+    in.add(beat_of({0, 0}, numbers(16)), 10);
+    in.add(beat_of({0, 0}, {1}, 16), 10);
+    if (updates) terminations.add(signals({60}), 8);
+    bench.run();
+    return out.records().back().cycle;
+  };
+  EXPECT_EQ(cycle_of_second(true), cycle_of_second(false));
+}
+
 TEST_F(ZropUnitTest, AppliesItsUpdatesPerCycle) {
   Bench bench("zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"updates_per_cycle", "4"}});
   Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 8);
