@@ -27,6 +27,7 @@ class BeatLines {
     for (unsigned position = 0; position < positions_per_tile; ++position) {
       halves_of_line_[places_[position].line][half_of_block(position)] |= places_[position].sectors;
     }
+    // Those that a line has come first.
     for (Halves& halves : halves_of_line_) std::fill(std::remove(halves.begin(), halves.end(), 0U), halves.end(), 0U);
     const Halves& first = halves_of_line_.front();
     const auto halves = static_cast<unsigned>(std::find(first.begin(), first.end(), 0U) - first.begin());

@@ -15,8 +15,8 @@ namespace vrpipe {
 /// the same order, stops for lines that come back (measured on a GH100 graphics GPC, ZROP and CROP alike but for the parts):
 ///
 /// * When a line has come into the cache again, its first visit stops until what the line held before has been used, in the
-///   parts of the line that the visit needs: CROP's lines are one, ZROP's have one for each half of an 8x8 block. If it has to stop, the line
-///   comes back.
+///   parts of the line that the visit needs: CROP's lines are one part, ZROP's have one for each half of an 8x8 block. If
+///   it has to stop, the line comes back.
 /// * What was asked for of a line that comes back was asked for in vain, and is asked for again at the second look; of colours also
 ///   what was asked for while an earlier use was still to come, but nothing waits for that (measured in sectors moved).
 /// * A line that comes back takes no sectors side by side: a visit that lacks some, in a half of which an earlier one has
@@ -176,15 +176,15 @@ class TimedLineUses {
   bool asked_early_ = false;
 };
 
-/// At `lt`: when second looks stop, and there is no first one for that.
+/// At `lt`: when second looks stop, so that there is no first one.
 class SecondLookStops {
  public:
   /// A second look that could be in one cycle is in another, which is not before; in the order of time.
   void add(Cycle could_be, Cycle is) {
     if (is > could_be) stops_.push({could_be, is});
   }
-  /// The cycle of a first look that could be in cycle `at`, which does not go back. In the cycle in which a second look stops or goes on, that
-  /// comes behind it.
+  /// The cycle of a first look that could be in cycle `at`, which does not go back. A second look comes behind the first ones of
+  /// its cycle, whether it stops or goes on.
   Cycle first_look_from(Cycle at) {
     for (; !stops_.empty() && at > stops_.front().could_be; stops_.pop()) at = std::max(at, stops_.front().is + 1);
     return at;
