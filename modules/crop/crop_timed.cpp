@@ -107,7 +107,6 @@ class TimedCrop : public TimedUnit {
 
   /// Looks quads of a warp up and blends them; returns the cycles of the look-ups.
   [[gnu::always_inline]] CycleInterval pass(const ShadedWarp& warp, unsigned from, unsigned to, CycleInterval visible) {
-    const bool fetches_ahead = !Plain && time_.fetches_ahead();
     const unsigned quads = to - from;
     const ColorSurface& surface = *behaviour_->surface();
     const std::size_t tile = surface.grid().place(warp.tile, 0);
@@ -118,8 +117,8 @@ class TimedCrop : public TimedUnit {
     }
     monitor_->prefetch_tile(tile);
     // Places in the queue, and lines that no queued quad needs.
-    SlotPool& queue = fetches_ahead ? ahead_ : queue_;
-    const unsigned places = fetches_ahead ? places_of(warp, from, tile) : quads;
+    SlotPool& queue = fetches_ahead() ? ahead_ : queue_;
+    const unsigned places = fetches_ahead() ? places_of(warp, from, tile) : quads;
     Cycle at = places > 0 ? queue.free_from(visible.first, 1) : visible.first;
     const Cycle has_places = places > 0 ? queue.free_from(std::max(at, visible.last), places) : visible.last;
     if (pins_lines()) {
@@ -128,10 +127,10 @@ class TimedCrop : public TimedUnit {
       at = pins_.line_free_from(*pinned_cache_, address, port_open_from(std::max(at, look_ups_.next())));
     }
     behaviour_->look_up(warp, from, to, cache_);
-    for (unsigned line = 0; line < cache_.count && !fetches_ahead; ++line) {
+    for (unsigned line = 0; line < cache_.count && !fetches_ahead(); ++line) {
       if (cache_.lines[line].replaced) at = std::max(at, last_blend_of_[cache_.lines[line].line]);
     }
-    CycleInterval looked_up = look_ups_.take(fetches_ahead ? first_look_from(at) : port_open_from(at), quads);
+    CycleInterval looked_up = look_ups_.take(fetches_ahead() ? first_look_from(at) : port_open_from(at), quads);
     looked_up.last = std::max(looked_up.last, has_places);
     Cycle there = looked_up.first + 1;
     Cycle asked = looked_up.first;
@@ -139,7 +138,7 @@ class TimedCrop : public TimedUnit {
       if (!cache_.lines[line].moves()) continue;
       while (cache_.place_of[sectors_of(warp, i).line] != line) ++i;  // the first that needs it
       asked = std::max(asked, looked_up.of_part(i - from, quads));
-      there = std::max(there, move(cache_.lines[line], fetches_ahead, asked));
+      there = std::max(there, move(cache_.lines[line], asked));
     }
     looked_up.last = std::max(looked_up.last, asked);
     look_ups_.hold(looked_up.last);
@@ -151,7 +150,7 @@ class TimedCrop : public TimedUnit {
       quads_are_alike() ? moves_.push({looked_up.last, moved}) : move_for_quads(warp, from, to, looked_up, moved);
     }
 
-    if (fetches_ahead) there = std::max(there, look_again(warp, from, looked_up.last, places));
+    if (fetches_ahead()) there = std::max(there, look_again(warp, from, looked_up.last, places));
 
     charge(UnitState::starved, looked_up.first + 1);
     if (const Cycle room = std::max(out_.last(), out_.room_from()); room > there && !joins_signals(there)) {
@@ -167,10 +166,11 @@ class TimedCrop : public TimedUnit {
     any_blended_ = true;
     quads_last(blended.last + time_.latency_cycles, quads, [&](unsigned i) { return warp.draw[from + i]; });
     did(CropWork::blend, quads, blended.first, blended.last + 1);
-    blend(warp, from, to, fetches_ahead, blended);
+    blend(warp, from, to, tile, blended);
     return looked_up;
   }
 
+  bool fetches_ahead() const { return !Plain && time_.fetches_ahead(); }
   bool has_port() const { return !Plain && time_.port.is_on(); }
   bool pins_lines() const { return !Plain && pinned_cache_ != nullptr; }
   bool quads_are_alike() const { return Plain || time_.quads_are_alike(); }
@@ -263,17 +263,17 @@ class TimedCrop : public TimedUnit {
   }
 
   /// Moves what a look-up says of a line; returns when its sectors are there.
-  Cycle move(const CropBehaviour::LineAccess& access, bool fetches_ahead, Cycle& at) {
+  Cycle move(const CropBehaviour::LineAccess& access, Cycle& at) {
     if (access.written_back != 0) {
       // Where tags run ahead, quads may still be blended into what the line held.
-      const Cycle from = fetches_ahead ? std::max(at, last_blend_of_[access.line]) : at;
+      const Cycle from = fetches_ahead() ? std::max(at, last_blend_of_[access.line]) : at;
       memory_.write_back(access, from);
       CropTime::Moves moves;
       moves.write(static_cast<unsigned>(__builtin_popcount(access.written_back)));
       send(moves.flits, from);
     }
     // What replaces colours does not read them.
-    if (fetches_ahead && access.replaced) uses_of(access).come(at, access.filled != 0);
+    if (fetches_ahead() && access.replaced) uses_of(access).come(at, access.filled != 0);
     return access.filled == 0 ? 0 : memory_.fill(access, at);
   }
   TimedLineUses& uses_of(const LineAccess& line) {
@@ -322,11 +322,10 @@ class TimedCrop : public TimedUnit {
     return std::max(there, at);
   }
 
-  [[gnu::always_inline]] void blend(const ShadedWarp& warp, unsigned from, unsigned to, bool fetches_ahead,
+  [[gnu::always_inline]] void blend(const ShadedWarp& warp, unsigned from, unsigned to, std::size_t tile,
                                     CycleInterval at) {
     CropBehaviour::Outcomes outcomes;
     behaviour_->blend_quads(warp, from, to, outcomes);
-    const std::size_t tile = behaviour_->surface()->grid().place(warp.tile, 0);
     unsigned terminated = 0;
     std::array<std::uint32_t, quads_per_warp> dirty{};  // by line
     for (unsigned i = from; i < to; ++i) {
@@ -340,7 +339,7 @@ class TimedCrop : public TimedUnit {
     for (unsigned i = 0; i < cache_.count; ++i) {
       const std::uint32_t line = cache_.lines[i].line;
       last_blend_of_[line] = at.last;
-      if (fetches_ahead) uses_of(cache_.lines[i]).used(LineVisits::whole_line, at.last);
+      if (fetches_ahead()) uses_of(cache_.lines[i]).used(LineVisits::whole_line, at.last);
       if (dirty[i] != 0) behaviour_->make_dirty(line, dirty[i]);
     }
   }

@@ -110,6 +110,32 @@ std::string label_of_quads(const std::vector<Box>& quads) {
   return label;
 }
 
+/// Loops of one-quad rectangles over screen tiles.
+std::vector<LawRow> tiles_in_turn(MicrobenchBench& bench) {
+  // Some loops have two states, in which their lines come back or do not. On the GPU they do; rounds of one visit, which are
+  // shorter than a trip, make them do so here.
+  constexpr unsigned first_rounds = 8;
+  const microbench::GpcTiles& gpc = bench.first_gpc();
+  std::vector<LawRow> rows;
+  for (const MeasuredRow& row : measured_table("tiles_in_turn")) {
+    const std::string& kind = row.text("what");
+    const BoxesAre what = kind == "killed"            ? BoxesAre::killed
+                          : kind == "stencil written" ? BoxesAre::stencil_written
+                                                      : BoxesAre::blended;
+    const std::vector<Box> quads = quads_of(row.text("quads"));
+    const unsigned tiles = row.count("tiles");
+    // So many that all queues are full of quads that wait, from the shorter frame on.
+    const auto rounds = static_cast<unsigned>(2048 / (tiles * quads.size()));
+    const MicrobenchSlope slope(bench, of_format(bench, kind == "RGBA8" ? kind : "RGBA16F"), std::max(rounds, 2U),
+                                [=, &gpc](unsigned count) {
+                                  return microbench::boxes_of_tiles(quads, tiles, count, what, gpc, first_rounds);
+                                });
+    rows.push_back({fmt::format("{}, {} tiles in turn", kind, tiles), label_of_quads(quads), row.number("clk"),
+                    clk_of(slope), "rmtwice.json"});
+  }
+  return rows;
+}
+
 }  // namespace
 
 void measure_strips(MicrobenchBench& bench) {
@@ -177,44 +203,20 @@ void measure_same_place(MicrobenchBench& bench) {
 }
 
 void measure_returning_lines(MicrobenchBench& bench) {
-  const microbench::GpcTiles& gpc = bench.first_gpc();
-  std::vector<LawRow> in_turn;
-  for (const MeasuredRow& row : measured_table("tiles_in_turn")) {
-    const std::string& kind = row.text("what");
-    const BoxesAre what = kind == "killed"            ? BoxesAre::killed
-                          : kind == "stencil written" ? BoxesAre::stencil_written
-                                                      : BoxesAre::blended;
-    const std::vector<Box> quads = quads_of(row.text("quads"));
-    const unsigned tiles = row.count("tiles");
-    // So many that all queues are full of quads that wait, from the shorter frame on. Some loops have two states, in which their
-    // lines come back or do not. On the GPU they do; the first rounds, which are shorter than a trip, make them do so here.
-    const auto rounds = static_cast<unsigned>(2048 / (tiles * quads.size()));
-    const MicrobenchSlope slope(bench, of_format(bench, kind == "RGBA8" ? kind : "RGBA16F"), std::max(rounds, 2U),
-                                [=, &gpc](unsigned count) {
-                                  return microbench::boxes_of_tiles(quads, tiles, count, what, gpc, 8);
-                                });
-    in_turn.push_back({fmt::format("{}, {} tiles in turn", kind, tiles), label_of_quads(quads), row.number("clk"),
-                       clk_of(slope), "rmtwice.json"});
-  }
-
-  struct Mode {
-    const char *column, *name, *format;
-    BoxesAre boxes;
-    SplatsAre splats;
-  };
-  const Mode modes[] = {{"killed", "killed", "RGBA16F", BoxesAre::killed, SplatsAre::killed},
-                        {"rgba8", "RGBA8", "RGBA8", BoxesAre::blended, SplatsAre::blended},
-                        {"rgba16f", "RGBA16F", "RGBA16F", BoxesAre::blended, SplatsAre::blended}};
+  const std::vector<LawRow> in_turn = tiles_in_turn(bench);
+  const SplatMode modes[] = {{"killed", "killed", "RGBA16F", SplatsAre::killed},
+                             {"rgba8", "RGBA8", "RGBA8", SplatsAre::blended},
+                             {"rgba16f", "RGBA16F", "RGBA16F", SplatsAre::blended}};
   std::vector<LawRow> scattered, squares;
-  for (const Mode& mode : modes) {
+  for (const SplatMode& mode : modes) {
     const RunRequest request = of_format(bench, mode.format);
+    const BoxesAre boxes = mode.what == SplatsAre::killed ? BoxesAre::killed : BoxesAre::blended;
     for (const MeasuredRow& row : measured_table("scattered_rectangles")) {
       const unsigned side = row.count("side"), step = row.count("step"), region = row.count("region");
-      // Pixels do not saturate yet.
-      const MicrobenchSlope slope(bench, request, 4000, [=, what = mode.boxes](unsigned count) {
-        return microbench::scattered_boxes(side, step, region, count, what);
+      const MicrobenchSlope slope(bench, request, 4000, [=](unsigned count) {
+        return microbench::scattered_boxes(side, step, region, count, boxes);
       });
-      scattered.push_back({fmt::format("scattered rectangles, {}", mode.name),
+      scattered.push_back({fmt::format("scattered rectangles, {}", mode.group),
                            fmt::format("{0}x{0} at multiples of {1} in {2}x{2}", side, step, region),
                            row.number(mode.column), clk_of(slope), "rmlad.json"});
     }
@@ -222,10 +224,10 @@ void measure_returning_lines(MicrobenchBench& bench) {
     for (const MeasuredRow& row : measured_table("hot_squares")) {
       const double half = row.number("half_axis");
       const unsigned region = row.count("region"), splats = row.count("splats");
-      const std::size_t frame = bench.add(request, [=, what = mode.splats] {
+      const std::size_t frame = bench.add(request, [=, what = mode.what] {
         return microbench::equal_splats(half, half, splat_opacity, splats, region, what);
       });
-      squares.push_back({fmt::format("splats in a square, {}", mode.name),
+      squares.push_back({fmt::format("splats in a square, {}", mode.group),
                          fmt::format("{0}x{0} in {1}x{1}", half, region), row.number(mode.column),
                          [=, &bench] { return bench.cycles(frame) / splats; }, "rmhot.json"});
     }
@@ -235,13 +237,11 @@ void measure_returning_lines(MicrobenchBench& bench) {
   report(bench, scattered, "clk a rectangle");
   report(bench, squares, "clk a splat");
   auto square = squares.begin();
-  for (const Mode& mode : modes) {
-    MicrobenchCurve curve{fmt::format("splats of 4x4 in a square, {}", mode.name),
-                          "side of the square, pixels",
-                          "clk a splat",
-                          {},
-                          {},
-                          {}};
+  for (const SplatMode& mode : modes) {
+    MicrobenchCurve curve;
+    curve.name = fmt::format("splats of 4x4 in a square, {}", mode.group);
+    curve.x_label = "side of the square, pixels";
+    curve.y_label = "clk a splat";
     for (const MeasuredRow& row : measured_table("hot_squares")) {
       const LawRow& splats = *square++;
       if (row.count("half_axis") != 4) continue;
