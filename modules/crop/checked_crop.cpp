@@ -37,14 +37,16 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
     for (unsigned i = 0; i < out.count; ++i) {
       if (out.lines[i].line >= held) fault("look_up", "line {} of a cache of {}", out.lines[i].line, held);
     }
-    for (unsigned i = from; out.count > 0 && i < to; ++i) {
+    for (unsigned i = from; i < to; ++i) {
       const QuadSectors& quad = time().sectors_of_quads()[warp.position[i]];
-      const unsigned place = out.place_of[quad.line];
-      if (place >= out.count) fault("look_up", "quad {} needs line {} of {}", i, place, out.count);
+      const std::uint32_t line = out.line_of[quad.line];
+      if (line >= held) fault("look_up", "quad {} needs line {} of a cache of {}", i, line, held);
       ++line_accesses_;
       sector_accesses_ += bits(quad.sectors);
     }
     for (unsigned i = 0; i < out.count; ++i) {
+      const unsigned quad = out.first_quad[i];
+      if (quad < from || quad >= to) fault("look_up", "quad {} of {} to {} needs a line", quad, from, to);
       line_misses_ += out.lines[i].replaced ? 1 : 0;
       sector_misses_ += bits(out.lines[i].missed);
       sectors_filled_ += bits(out.lines[i].filled);
@@ -53,9 +55,6 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
   }
   SectoredCache* cache() override {
     return ask("cache", [&] { return checked_->cache(); });
-  }
-  void make_dirty(std::uint32_t line, std::uint32_t sectors) override {
-    ask("make_dirty", [&] { checked_->make_dirty(line, sectors); });
   }
   const CropTime& time() const override {
     return ask("time", [&]() -> const CropTime& { return checked_->time(); });

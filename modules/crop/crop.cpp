@@ -102,24 +102,31 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
   const std::uint64_t tile = surface_->address(warp.tile, 0);
   // Without branches on whether a line is new, which would be mispredicted.
   std::array<std::uint8_t, quads_per_warp> needed;
+  std::array<std::uint8_t, quads_per_warp> first_quad;
   std::uint64_t seen = 0;
   unsigned count = 0;
   for (unsigned i = from; i < to; ++i) {
     const QuadSectors& quad = time_.sectors_of_quads()[warp.position[i]];
     needed[count] = static_cast<std::uint8_t>(quad.line);
+    first_quad[count] = static_cast<std::uint8_t>(i);
     count += (seen >> quad.line & 1U) == 0;
     seen |= std::uint64_t{1} << quad.line;
     sectors_needed_[quad.line] |= quad.sectors;
   }
-  out.count = count;
-  for (unsigned place = 0; place < count; ++place) {
-    const unsigned line = needed[place];
-    out.place_of[line] = static_cast<std::uint8_t>(place);
-    out.lines[place].address = tile + std::uint64_t{line} * time_.cache.line_bytes;
-    out.lines[place].sectors = std::exchange(sectors_needed_[line], 0);
-    if (replaces_) out.lines[place].known = context_.state(warp.draw[from]).blend ? 0 : ~0U;  // all quads' state
-    cache_->look_up(out.lines[place]);
+  LineAccess* access = out.lines.data();
+  unsigned missed = 0;
+  for (unsigned i = 0; i < count; ++i) {
+    const unsigned line = needed[i];
+    access->address = tile + std::uint64_t{line} * time_.cache.line_bytes;
+    access->sectors = std::exchange(sectors_needed_[line], 0);
+    if (replaces_) access->known = context_.state(warp.draw[from]).blend ? 0 : ~0U;  // all quads' state
+    cache_->look_up(*access);
+    out.line_of[line] = access->line;
+    if (access->missed == 0) continue;
+    out.first_quad[missed++] = first_quad[i];
+    ++access;
   }
+  out.count = missed;
   // All quads need as many sectors.
   cache_->accessed(to - from, (to - from) * time_.sectors_of_a_quad());
 }

@@ -29,7 +29,6 @@ class ColorRop : public CropBehaviour {
   void look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) override;
   void check_end() override;
   SectoredCache* cache() override;
-  void make_dirty(std::uint32_t line, std::uint32_t sectors) override { cache_->make_dirty(line, sectors); }
   const CropTime& time() const override { return time_; }
 
   Counter fragments_lost_to_rounding{

@@ -75,12 +75,13 @@ double CropTime::least_cycles(const Sum& sum) const {
 unsigned CropTime::flits_of_reads(const ShadedWarp& warp, unsigned from, unsigned to,
                                   const CropBehaviour::CacheLookUp& looked_up, const ColorSurface& surface) {
   const std::size_t tile = surface.grid().place(warp.tile, 0);
-  std::array<std::uint32_t, quads_per_warp> lacking{};  // by line
-  for (unsigned line = 0; line < looked_up.count; ++line) lacking[line] = looked_up.lines[line].filled;
+  std::array<std::uint32_t, positions_per_tile> lacking{};  // by line of the tile
+  for (unsigned i = 0; i < looked_up.count; ++i)
+    lacking[sectors_of_quads_[warp.position[looked_up.first_quad[i]]].line] = looked_up.lines[i].filled;
   unsigned flits = 0;
   for (unsigned i = from; i < to; ++i) {
     const QuadSectors& quad = sectors_of_quads_[warp.position[i]];
-    std::uint32_t& left = lacking[looked_up.place_of[quad.line]];
+    std::uint32_t& left = lacking[quad.line];
     if ((left & quad.sectors) == 0) continue;
     left &= ~quad.sectors;
     flits += flits_of_read(tile, warp.first_primitive[i], quad.line);

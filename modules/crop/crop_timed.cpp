@@ -75,7 +75,8 @@ class TimedCrop : public TimedUnit {
     const ColorSurface* const surface = behaviour_->surface();
     if (surface == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
     monitor_ = std::make_unique<BlendOrderMonitor>(surface->width(), surface->height());
-    if (TimedPins::are_needed(time_.cache.replacement) && !time_.fetches_ahead()) pinned_cache_ = behaviour_->cache();
+    tags_ = behaviour_->cache();
+    pins_lines_ = tags_ != nullptr && TimedPins::are_needed(time_.cache.replacement) && !time_.fetches_ahead();
     if (time_.fetches_ahead()) uses_.resize(surface->size_bytes() / time_.cache.line_bytes + 1);
   }
 
@@ -111,10 +112,7 @@ class TimedCrop : public TimedUnit {
     const ColorSurface& surface = *behaviour_->surface();
     const std::size_t tile = surface.grid().place(warp.tile, 0);
     const QuadColor* const stored = &surface.quad(tile);
-    for (unsigned i = from; i < to; ++i) {
-      __builtin_prefetch(&stored[warp.position[i]], 1);
-      __builtin_prefetch(&warp.color[i]);
-    }
+    for (unsigned i = from; i < to; ++i) __builtin_prefetch(&stored[warp.position[i]], 1);
     monitor_->prefetch_tile(tile);
     // Places in the queue, and lines that no queued quad needs.
     SlotPool& queue = fetches_ahead() ? ahead_ : queue_;
@@ -122,23 +120,21 @@ class TimedCrop : public TimedUnit {
     Cycle at = places > 0 ? queue.free_from(visible.first, 1) : visible.first;
     const Cycle has_places = places > 0 ? queue.free_from(std::max(at, visible.last), places) : visible.last;
     if (pins_lines()) {
-      const std::uint64_t line = sectors_of(warp, from).line;
-      const std::uint64_t address = surface.address(tile) + line * time_.cache.line_bytes;
-      at = pins_.line_free_from(*pinned_cache_, address, port_open_from(std::max(at, look_ups_.next())));
+      const std::uint64_t address = address_of(tile, sectors_of(warp, from));
+      at = pins_.line_free_from(*tags_, address, port_open_from(std::max(at, look_ups_.next())));
     }
     behaviour_->look_up(warp, from, to, cache_);
-    for (unsigned line = 0; line < cache_.count && !fetches_ahead(); ++line) {
-      if (cache_.lines[line].replaced) at = std::max(at, last_blend_of_[cache_.lines[line].line]);
+    for (unsigned i = 0; i < cache_.count && !fetches_ahead(); ++i) {
+      if (cache_.lines[i].replaced) at = std::max(at, last_blend_of_[cache_.lines[i].line]);
     }
     CycleInterval looked_up = look_ups_.take(fetches_ahead() ? first_look_from(at) : port_open_from(at), quads);
     looked_up.last = std::max(looked_up.last, has_places);
     Cycle there = looked_up.first + 1;
     Cycle asked = looked_up.first;
-    for (unsigned line = 0, i = from; line < cache_.count; ++line) {
-      if (!cache_.lines[line].moves()) continue;
-      while (cache_.place_of[sectors_of(warp, i).line] != line) ++i;  // the first that needs it
-      asked = std::max(asked, looked_up.of_part(i - from, quads));
-      there = std::max(there, move(cache_.lines[line], asked));
+    for (unsigned i = 0; i < cache_.count; ++i) {
+      if (!cache_.lines[i].moves()) continue;
+      asked = std::max(asked, looked_up.of_part(cache_.first_quad[i] - from, quads));
+      there = std::max(there, move(cache_.lines[i], asked));
     }
     looked_up.last = std::max(looked_up.last, asked);
     look_ups_.hold(looked_up.last);
@@ -150,7 +146,7 @@ class TimedCrop : public TimedUnit {
       quads_are_alike() ? moves_.push({looked_up.last, moved}) : move_for_quads(warp, from, to, looked_up, moved);
     }
 
-    if (fetches_ahead()) there = std::max(there, look_again(warp, from, looked_up.last, places));
+    if (fetches_ahead()) there = std::max(there, look_again(warp, from, tile, looked_up.last, places));
 
     charge(UnitState::starved, looked_up.first + 1);
     if (const Cycle room = std::max(out_.last(), out_.room_from()); room > there && !joins_signals(there)) {
@@ -162,7 +158,7 @@ class TimedCrop : public TimedUnit {
     charge(UnitState::memory, blended.first);
     charge(UnitState::busy, blended.last + 1);
     if (places > 0) queue_.take(places, blended);
-    if (pins_lines()) pins_.pin(*pinned_cache_, cache_.lines[0].line, blended.last);
+    if (pins_lines()) pins_.pin(*tags_, cache_.line_of[sectors_of(warp, from).line], blended.last);
     any_blended_ = true;
     quads_last(blended.last + time_.latency_cycles, quads, [&](unsigned i) { return warp.draw[from + i]; });
     did(CropWork::blend, quads, blended.first, blended.last + 1);
@@ -172,7 +168,7 @@ class TimedCrop : public TimedUnit {
 
   bool fetches_ahead() const { return !Plain && time_.fetches_ahead(); }
   bool has_port() const { return !Plain && time_.port.is_on(); }
-  bool pins_lines() const { return !Plain && pinned_cache_ != nullptr; }
+  bool pins_lines() const { return !Plain && pins_lines_; }
   bool quads_are_alike() const { return Plain || time_.quads_are_alike(); }
   /// Whether a quad is blended in the cycle of the last that signalled, from one on, so that its signal would go with it.
   bool joins_signals(Cycle there) const {
@@ -183,11 +179,15 @@ class TimedCrop : public TimedUnit {
                                         unsigned moved) {
     for (unsigned i = from; i < to; ++i) {
       const auto& [line, sectors] = sectors_of(warp, i);
-      LineAccess& access = cache_.lines[cache_.place_of[line]];
+      const auto end = cache_.lines.begin() + cache_.count;
+      const auto access =
+          std::find_if(cache_.lines.begin(), end,
+                       [&, in_cache = cache_.line_of[line]](const LineAccess& of) { return of.line == in_cache; });
+      if (access == end) continue;
       const Cycle at = looked_up.of_part(i - from, to - from);
-      const auto written_back = static_cast<unsigned>(__builtin_popcount(std::exchange(access.written_back, 0)));
-      const auto filled = static_cast<unsigned>(__builtin_popcount(access.filled & sectors));
-      access.filled &= ~sectors;
+      const auto written_back = static_cast<unsigned>(__builtin_popcount(std::exchange(access->written_back, 0)));
+      const auto filled = static_cast<unsigned>(__builtin_popcount(access->filled & sectors));
+      access->filled &= ~sectors;
       if (written_back > 0) moves_.push({at, written_back});
       for (unsigned sector = 0; sector < filled; ++sector) moves_.push({at, 1});
       moved -= written_back + filled;
@@ -228,9 +228,13 @@ class TimedCrop : public TimedUnit {
   }
   CropTime::Quad priced_quad(const ShadedWarp& warp, unsigned index) const {
     const QuadSectors& sectors = sectors_of(warp, index);
-    return {cache_.line_of(sectors).address, sectors.sectors,
-            behaviour_->surface()->grid().place(warp.tile, warp.position[index]), warp.live[index],
+    const std::size_t tile = behaviour_->surface()->grid().place(warp.tile, 0);
+    return {address_of(tile, sectors), sectors.sectors, tile + warp.position[index], warp.live[index],
             context_.state(warp.draw[index]).blend};
+  }
+  /// Of a line of a tile, by the tile's place in the surface.
+  std::uint64_t address_of(std::size_t tile, const QuadSectors& line) const {
+    return behaviour_->surface()->address(tile) + std::uint64_t{line.line} * time_.cache.line_bytes;
   }
   [[gnu::noinline]] Cycle wait_for_hazard(const CropTime::Quad& quad, Cycle there) {
     const Cycle free = time_.free_from(time_.price(), there);
@@ -273,11 +277,11 @@ class TimedCrop : public TimedUnit {
       send(moves.flits, from);
     }
     // What replaces colours does not read them.
-    if (fetches_ahead() && access.replaced) uses_of(access).come(at, access.filled != 0);
+    if (fetches_ahead() && access.replaced) uses_of(access.address).come(at, access.filled != 0);
     return access.filled == 0 ? 0 : memory_.fill(access, at);
   }
-  TimedLineUses& uses_of(const LineAccess& line) {
-    return uses_[(line.address - behaviour_->surface()->address(0)) / time_.cache.line_bytes];
+  TimedLineUses& uses_of(std::uint64_t address) {
+    return uses_[(address - behaviour_->surface()->address(0)) / time_.cache.line_bytes];
   }
 
   /// Where there are two.
@@ -292,27 +296,25 @@ class TimedCrop : public TimedUnit {
   /// In a queue, of a quad of a tile in the surface.
   unsigned places_of(const ShadedWarp& warp, unsigned index, std::size_t tile) {
     const QuadSectors& sectors = sectors_of(warp, index);
-    const std::uint64_t line =
-        behaviour_->surface()->address(tile) + std::uint64_t{sectors.line} * time_.cache.line_bytes;
-    return time_.takes_place(line, sectors.sectors) ? 1 : 0;
+    return time_.takes_place(address_of(tile, sectors), sectors.sectors) ? 1 : 0;
   }
   /// The second look at the tag of a quad, as LinesAhead's; returns when its sectors are there.
-  [[gnu::noinline]] Cycle look_again(const ShadedWarp& warp, unsigned index, Cycle looked_up, unsigned places) {
-    const auto& [line_of_tile, sectors] = sectors_of(warp, index);
-    const CropBehaviour::LineAccess& line = cache_.lines[cache_.place_of[line_of_tile]];
-    const LineVisits::Visit visit =
-        visits_.of(behaviour_->surface()->grid().place(warp.tile, 0), warp.first_primitive[index]);
+  [[gnu::noinline]] Cycle look_again(const ShadedWarp& warp, unsigned index, std::size_t tile, Cycle looked_up,
+                                     unsigned places) {
+    const QuadSectors& needed = sectors_of(warp, index);
+    const std::uint64_t address = address_of(tile, needed);
+    const LineVisits::Visit visit = visits_.of(tile, warp.first_primitive[index]);
     Cycle at = second_looks_.take(places > 0 ? queue_.free_from(looked_up, places) : looked_up, 1).first;
     Cycle there = at;
     const Cycle could_be = at;
     const TimedLineUses::Look look =
-        uses_of(line).look_again(visit, sectors, LineVisits::whole_line, time_.cache.sectors_of_a_half(), at);
+        uses_of(address).look_again(visit, needed.sectors, LineVisits::whole_line, time_.cache.sectors_of_a_half(), at);
     stops_.add(could_be, at);
     if (look.again != 0) {
       fetched_again_ += static_cast<unsigned>(__builtin_popcount(look.again));
       if (look.is_first) send(1, at);
       LineAccess again;
-      again.address = line.address;
+      again.address = address;
       again.filled = look.again;
       const Cycle filled = memory_.fill_at_once(again, at);
       if (look.comes_back) there = filled;
@@ -327,21 +329,16 @@ class TimedCrop : public TimedUnit {
     CropBehaviour::Outcomes outcomes;
     behaviour_->blend_quads(warp, from, to, outcomes);
     unsigned terminated = 0;
-    std::array<std::uint32_t, quads_per_warp> dirty{};  // by line
     for (unsigned i = from; i < to; ++i) {
       monitor_->blended(tile + warp.position[i], warp, i, at.last);
       terminated |= outcomes[i].terminated;
-      if (!outcomes[i].changed && !time_.writes_unchanged) continue;
       const QuadSectors& quad = sectors_of(warp, i);
-      dirty[cache_.place_of[quad.line]] |= quad.sectors;
-    }
-    if (terminated != 0) signal(warp, from, to, outcomes, at);
-    for (unsigned i = 0; i < cache_.count; ++i) {
-      const std::uint32_t line = cache_.lines[i].line;
+      const std::uint32_t line = cache_.line_of[quad.line];
       last_blend_of_[line] = at.last;
-      if (fetches_ahead()) uses_of(cache_.lines[i]).used(LineVisits::whole_line, at.last);
-      if (dirty[i] != 0) behaviour_->make_dirty(line, dirty[i]);
+      if (tags_ != nullptr && (outcomes[i].changed || time_.writes_unchanged)) tags_->make_dirty(line, quad.sectors);
     }
+    if (fetches_ahead()) uses_of(address_of(tile, sectors_of(warp, from))).used(LineVisits::whole_line, at.last);
+    if (terminated != 0) signal(warp, from, to, outcomes, at);
   }
 
   void signal(const ShadedWarp& warp, unsigned from, unsigned to, const CropBehaviour::Outcomes& outcomes,
@@ -404,7 +401,8 @@ class TimedCrop : public TimedUnit {
   std::vector<TimedLineUses> uses_;   ///< by line of the surface, where tags are looked at twice
   VisitCounter visits_;
   SecondLookStops stops_;
-  SectoredCache* pinned_cache_ = nullptr;  ///< where lines of queued quads are pinned
+  SectoredCache* tags_ = nullptr;  ///< of the behaviour, if it has any
+  bool pins_lines_ = false;        ///< of queued quads
   TimedPins pins_;
   unsigned signalled_ = 0;  ///< quads, in the last cycle with any
   Cycle signalled_at_ = never;

@@ -111,7 +111,8 @@ class UntimedCrop : public UntimedUnit {
     CropBehaviour::Outcomes outcomes;
     behaviour_->blend_quads(warp, from, to, outcomes);
     if (follows_cache()) {
-      for (unsigned i = from; i < to; ++i) account(warp, i, outcomes[i]);
+      SectoredCache* const tags = behaviour_->cache();
+      for (unsigned i = from; i < to; ++i) account(warp, i, outcomes[i], tags);
     }
     if (signals_) signal(warp, from, to, outcomes);
   }
@@ -126,11 +127,11 @@ class UntimedCrop : public UntimedUnit {
     }
   }
 
-  void account(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome) {
+  void account(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome, SectoredCache* tags) {
     const bool changed = outcome.changed || time_.writes_unchanged;
-    if (cache_.count > 0 && changed) {
+    if (tags != nullptr && changed) {
       const QuadSectors& quad = time_.sectors_of_quads()[warp.position[index]];
-      behaviour_->make_dirty(cache_.line_of(quad).line, quad.sectors);
+      tags->make_dirty(cache_.line_of[quad.line], quad.sectors);
     }
     if (counts_) count(warp, index, outcome);
   }

@@ -166,7 +166,6 @@ class RunAhead::RepeatingCrop final : public CropBehaviour {
     crop_.look_up(warp, from, to, out);
   }
   SectoredCache* cache() override { return crop_.cache(); }
-  void make_dirty(std::uint32_t line, std::uint32_t sectors) override { crop_.make_dirty(line, sectors); }
   const CropTime& time() const override { return crop_.time(); }
 
  private:

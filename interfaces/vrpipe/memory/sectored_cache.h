@@ -154,6 +154,10 @@ class SectoredCache {
     statistics_->line_hits += accesses - allocated_;
     statistics_->sector_accesses += sectors;
     statistics_->sector_hits += sectors - missed_;
+    if (missed_ == 0) {
+      allocated_ = 0;
+      return;
+    }
     statistics_->sector_misses += missed_;
     statistics_->sector_misses_capacity += missed_ - of_other_cause_;
     statistics_->bytes_filled += (missed_ - not_filled_) * sector_bytes_;

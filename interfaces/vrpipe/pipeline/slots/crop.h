@@ -46,20 +46,19 @@ class CropBehaviour : public Behaviour {
   using LineAccess = vrpipe::LineAccess;
   /// And for quads of a warp, whose sectors are those of their places in the screen tile (CropTime::sectors_of_quads).
   struct CacheLookUp {
-    unsigned count = 0;  ///< of lines, in the order in which they are needed first
+    /// Of the cache, by line of the tile: those that are needed.
+    std::array<std::uint32_t, positions_per_tile> line_of{};
+    unsigned count = 0;  ///< of those of which anything is missed, in the order in which they are needed first
     std::array<LineAccess, quads_per_warp> lines;
-    std::array<std::uint8_t, positions_per_tile> place_of{};  ///< in `lines`, of those of the tile's that are needed
-    const LineAccess& line_of(const QuadSectors& quad) const { return lines[place_of[quad.line]]; }
+    std::array<std::uint8_t, quads_per_warp> first_quad{};  ///< in the warp, that needs each of these
   };
   /// Looks quads `from` to `to` - 1 of a warp up, before their `blend`, in the order of blending. The cache sees this
   /// order alone, so that which sectors move does not depend on when; for timing models that do not follow fills through the
-  /// cache themselves. Without a cache, no line is needed.
+  /// cache themselves. Without a cache, none is missed.
   virtual void look_up(const ShadedWarp&, unsigned /*from*/, unsigned /*to*/, CacheLookUp& out) { out.count = 0; }
-  /// The colour cache of `look_up`, for models that pin lines of quads between their look-up and their blend, and look up quad
-  /// by quad then. None: whatever is looked up is there.
+  /// The colour cache of `look_up`, for models that make sectors dirty after their `blend`, or pin lines of quads between
+  /// their look-up and their blend, and look up quad by quad then. None: whatever is looked up is there.
   virtual SectoredCache* cache() { return nullptr; }
-  /// After a `blend` whose sectors are dirty for it.
-  virtual void make_dirty(std::uint32_t /*line*/, std::uint32_t /*sectors*/) {}
   /// What its work takes: the parameters of its timing models (modules/crop/crop_time.h).
   virtual const CropTime& time() const = 0;
 
