@@ -23,10 +23,14 @@ constexpr std::int64_t narrow_limit = std::int64_t{1} << 30;
 
 static_assert(offsetof(Quad, position) == 4 && offsetof(Quad, coverage) == 5);
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
-constexpr unsigned position_shift = 32;
-constexpr unsigned coverage_shift = 40;
-constexpr unsigned triangle_shift = 48;
-constexpr unsigned draw_shift = 49;
+// In the upper half of a quad's word, in which its position is lowest:
+constexpr unsigned coverage_shift = 8;
+constexpr unsigned triangle_shift = 16;
+constexpr unsigned draw_shift = 17;
+/// Of a raster tile's quads row by row: the position, from the first one's.
+constexpr std::uint8_t place_of(unsigned quad) {
+  return static_cast<std::uint8_t>(quads_per_tile_row * (quad / 4) + quad % 4);
+}
 
 /// Of a raster tile's 4x4 quads, 4 bits each: the samples in the first so many columns, and rows.
 struct SamplesBelow {
@@ -47,37 +51,58 @@ constexpr SamplesBelow samples_below = [] {
   return below;
 }();
 
-/// Puts those of four quads in a row of the raster tile that are covered one after the other; returns how many. A quad is
-/// one word, since one of narrow stores would be waited for when it is copied. All four are written, since a branch would
-/// be mispredicted too often.
-unsigned put_covered(Quad* out, Words quads, Words covered) {
-  quads |= covered << coverage_shift;
+/// Puts those of a raster tile's quads that are covered one after the other, row by row; returns how many.
+/// @param first  the upper half of the first one's word, without coverage
+unsigned put_covered(Quad* out, std::uint32_t splat, std::uint32_t first, std::uint64_t coverage) {
 #if defined(__AVX2__)
-  // By the bits of those that are not covered: where the halves of the others come from.
-  static constexpr auto halves_from = [] {
-    std::array<std::array<std::int32_t, 8>, 16> from{};
-    for (unsigned empty = 0; empty < 16; ++empty) {
+  // Two rows at a time, all eight quads of them, since a branch would be mispredicted too often.
+  using Bytes = char __attribute__((vector_size(16)));
+  using Shorts = std::int16_t __attribute__((vector_size(16)));
+  using Longs = std::uint64_t __attribute__((vector_size(16)));
+  // By the bits of those that are not covered: the places of the others, a byte each.
+  static constexpr auto places_of = [] {
+    std::array<std::uint64_t, 256> places{};
+    for (unsigned empty = 0; empty < 256; ++empty) {
       unsigned put = 0;
-      for (std::int32_t quad = 0; quad < 4; ++quad) {
-        if ((empty >> quad & 1U) != 0) continue;
-        from[empty][put++] = 2 * quad;
-        from[empty][put++] = 2 * quad + 1;
+      for (unsigned quad = 0; quad < 8; ++quad) {
+        constexpr unsigned byte[] = {0, 1, 4, 5, 2, 3, 6, 7};  // as halves of words are interleaved below
+        if ((empty >> quad & 1U) == 0) places[empty] |= std::uint64_t{place_of(quad)} << (8 * byte[put++]);
       }
     }
-    return from;
+    return places;
   }();
-  const unsigned empty = sign_mask(reinterpret_cast<Words>(covered == 0));
-  LanePairBits from;
-  std::memcpy(&from, &halves_from[empty], sizeof from);
-  const LanePairBits packed = __builtin_ia32_permvarsi256(reinterpret_cast<LanePairBits>(quads), from);
-  std::memcpy(static_cast<void*>(out), &packed, sizeof packed);
-  return 4 - popcount(static_cast<LaneMask>(empty));
+  const auto interleave = [](Bytes even, Bytes odd) {
+    return __builtin_shufflevector(even, odd, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+  };
+  const Longs bits{coverage, 0};
+  const Bytes covered = interleave(reinterpret_cast<Bytes>(bits), reinterpret_cast<Bytes>(bits >> 4)) & 0xf;
+  const auto empty = static_cast<unsigned>(__builtin_ia32_pmovmskb128(reinterpret_cast<Bytes>(covered == 0)));
+  const auto put_rows = [&](Quad* to, LaneBits rows, unsigned none, std::uint32_t from) {
+    const auto places = reinterpret_cast<Bytes>(Longs{places_of[none], 0});
+    const auto own =
+        reinterpret_cast<Shorts>(interleave(places, __builtin_ia32_pshufb128(reinterpret_cast<Bytes>(rows), places)));
+    const auto widened = reinterpret_cast<LanePairBits>(
+        __builtin_shufflevector(own, Shorts{}, 0, 8, 1, 9, 2, 10, 3, 11, 4, 12, 5, 13, 6, 14, 7, 15));
+    const LanePairBits upper = widened + static_cast<std::int32_t>(from);
+    const LanePairBits lower = LanePairBits{} + static_cast<std::int32_t>(splat);
+    const LanePairBits first_four = __builtin_shufflevector(lower, upper, 0, 8, 1, 9, 4, 12, 5, 13);
+    const LanePairBits last_four = __builtin_shufflevector(lower, upper, 2, 10, 3, 11, 6, 14, 7, 15);
+    std::memcpy(static_cast<void*>(to), &first_four, sizeof first_four);
+    std::memcpy(static_cast<void*>(to + 4), &last_four, sizeof last_four);
+  };
+  // A row's coverage goes where its places point to.
+  const auto rows = reinterpret_cast<LaneBits>(covered);
+  const auto in_upper = static_cast<unsigned>(__builtin_popcount(~empty & 0xffU));
+  put_rows(out, __builtin_shufflevector(rows, rows, 0, 0, 1, 1), empty & 0xffU, first);
+  put_rows(out + in_upper, __builtin_shufflevector(rows, rows, 2, 2, 3, 3), empty >> 8U, first + place_of(8));
+  return static_cast<unsigned>(__builtin_popcount(empty ^ 0xffffU));
 #else
   unsigned count = 0;
-  for (unsigned quad = 0; quad < 4; ++quad) {
-    const std::uint64_t bits = quads[quad];
+  for (unsigned quad = 0; quad < 16; ++quad) {
+    const auto covered = static_cast<std::uint32_t>(coverage >> (4 * quad) & all_lanes);
+    const std::uint64_t bits = splat | std::uint64_t{first + place_of(quad) + (covered << coverage_shift)} << 32U;
     std::memcpy(static_cast<void*>(out + count), &bits, sizeof bits);
-    count += covered[quad] != 0 ? 1U : 0U;
+    count += covered != 0 ? 1U : 0U;
   }
   return count;
 #endif
@@ -111,6 +136,7 @@ void TileRasterizer::hold_as(const Behaviour& other) {
 void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   ++setups;
   primitive_ = primitive;
+  first_bits_ = std::uint32_t{primitive.triangle} << triangle_shift | std::uint32_t{primitive.draw} << draw_shift;
   area_ = primitive.bounds;
   // A primitive covers nothing outside its bounds, so those need no masking.
   const bool whole = clip.x0 <= primitive.bounds.x0 && clip.y0 <= primitive.bounds.y0 &&
@@ -241,22 +267,6 @@ void TileRasterizer::tell(const QuadBeat& made) const {
   }
 }
 
-inline void TileRasterizer::put_quads(QuadBeat& out, unsigned part, std::uint64_t coverage) const {
-  const unsigned first = 4 * quads_per_tile_row * (part >> 1U) + 4 * (part & 1U);
-  const std::uint64_t upper_left = primitive_.splat | std::uint64_t{first} << position_shift |
-                                   std::uint64_t{primitive_.triangle} << triangle_shift |
-                                   std::uint64_t{primitive_.draw} << draw_shift;
-  constexpr std::uint64_t to_the_right = std::uint64_t{1} << position_shift;
-  Words quads = upper_left + Words{0, to_the_right, 2 * to_the_right, 3 * to_the_right};
-  unsigned count = 0;
-  for (unsigned row = 0; row < 4; ++row) {
-    const Words covered = ((Words{} + coverage) >> (Words{0, 4, 8, 12} + 16 * row)) & all_lanes;
-    count += put_covered(&out.quads[count], quads, covered);
-    quads += quads_per_tile_row * to_the_right;
-  }
-  out.count = static_cast<std::uint8_t>(count);
-}
-
 bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) {
   coarse_tests = 0;
   while (true) {
@@ -279,7 +289,8 @@ bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_scree
     out.mark = Mark::none;
     const OfEdges value = at_tile_ + at_part_[part];
     const std::uint64_t covered = (wide_ ? coverage_of_wide(value) : coverage_of_narrow(value)) & in_area(part);
-    put_quads(out, part, covered);
+    const std::uint32_t first = first_bits_ | 4 * quads_per_tile_row * (part >> 1U) | 4 * (part & 1U);
+    out.count = static_cast<std::uint8_t>(put_covered(out.quads.data(), primitive_.splat, first, covered));
     if (by_halves_) take_by_halves(out);
     quads_rasterized.add(primitive_.draw, out.count);
     fragments_rasterized.add(primitive_.draw, static_cast<unsigned>(__builtin_popcountll(covered)));

@@ -195,8 +195,6 @@ class TileRasterizer : public RasterBehaviour {
   void tell(const QuadBeat& made) const;
   /// Those of a raster tile of the screen tile that are not masked off.
   std::uint64_t in_area(unsigned part) const;
-  /// All quads of it that are covered.
-  void put_quads(QuadBeat& out, unsigned part, std::uint64_t coverage) const;
   /// Goes on to the next screen tile, and tests its raster tiles against the edges; false if there is none.
   bool enter_tile();
   [[gnu::noinline]] static void take_by_halves(QuadBeat& tile);
@@ -217,9 +215,10 @@ class TileRasterizer : public RasterBehaviour {
   OfEdges most_in_part_[4] = {};  ///< at the sample where it is largest
   Fill fill_[3];
   Primitive primitive_;
-  PixelRect area_;           ///< bounds of the primitive within the clip
-  PixelRect mask_area_;      ///< outside which samples are masked off
-  std::int32_t next_x_ = 0;  ///< the screen tile to enter next, in tiles
+  std::uint32_t first_bits_ = 0;  ///< the upper half of the word of its quad at position 0, without coverage
+  PixelRect area_;                ///< bounds of the primitive within the clip
+  PixelRect mask_area_;           ///< outside which samples are masked off
+  std::int32_t next_x_ = 0;       ///< the screen tile to enter next, in tiles
   std::int32_t next_y_ = 0;
   std::int32_t tile_x_begin_ = 0;
   std::int32_t tile_x_end_ = 0;
