@@ -16,8 +16,9 @@ namespace vrpipe {
 namespace {
 constexpr auto tile_side = static_cast<std::int32_t>(screen_tile_pixels);
 constexpr auto raster_side = static_cast<std::int32_t>(raster_tile_pixels);
-// Within a raster tile an edge function changes by at most 7 (|dx| + |dy|). Below this bound that is under 2^30, and a
-// value beyond +-2^30 at the tile's first sample keeps its sign over the tile: then 32 bits are exact after clamping.
+// Within a raster tile an edge function changes by at most 7 (|dx| + |dy|). Below this bound that is under 2^30: a value
+// beyond 2^30 at the tile's first sample keeps its sign over the tile, and one below -2^30 would, but then the tile is not
+// kept. So 32 bits are exact after clamping.
 constexpr std::int64_t narrow_gradient = (std::int64_t{1} << 30) / 7;
 constexpr std::int64_t narrow_limit = std::int64_t{1} << 30;
 
@@ -153,6 +154,8 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   next_x_ = tile_x_begin_;
   next_y_ = area_.y0 / tile_side;
   tile_y_end_ = area_.empty() ? next_y_ : (area_.y1 - 1) / tile_side + 1;
+  is_masked_ = mask_area_.x0 > tile_x_begin_ * tile_side || mask_area_.x1 < tile_x_end_ * tile_side ||
+               mask_area_.y0 > next_y_ * tile_side || mask_area_.y1 < tile_y_end_ * tile_side;
   left_ = kept_ = 0;
 
   tests_hi_z_ = hi_z_ != nullptr && hi_z_->begin(primitive);
@@ -201,13 +204,13 @@ void TileRasterizer::set_up_tiles(const OfEdges& dx, const OfEdges& dy) {
   dy_ = dy;
   right_ = dx * tile_side;
   below_ = dy * tile_side;
+  at_part_[1] = raster_side * dx;
+  at_part_[2] = raster_side * dy;
+  at_part_[3] = at_part_[1] + at_part_[2];
   // The largest value over a tile's samples is at the corner to which the gradient points.
   const OfEdges reach = (raster_side - 1) * ((dx & (dx > 0)) + (dy & (dy > 0)));
-  for (unsigned part = 0; part < 4; ++part) {
-    at_part_[part] = raster_side * (((part & 1U) != 0 ? dx : OfEdges{}) + ((part & 2U) != 0 ? dy : OfEdges{}));
-    most_in_part_[part] = at_part_[part] + reach;
-  }
   for (unsigned i = 0; i < 3; ++i) {
+    most_in_parts_[i] = (OfParts{0, -1, 0, -1} & at_part_[1][i]) + (OfParts{0, 0, -1, -1} & at_part_[2][i]) + reach[i];
     // Of edges that are too wide, which are filled by these only if that effect was left out by force, the low bits.
     const auto across = static_cast<std::int32_t>(dx[i]);
     const auto down = static_cast<std::int32_t>(dy[i]);
@@ -224,6 +227,7 @@ void TileRasterizer::set_up_rectangle() {
   at_next_ = at_row_ = OfEdges{};
   set_up_tiles(OfEdges{}, OfEdges{});
   mask_area_ = area_;
+  is_masked_ = true;
 }
 
 std::int32_t TileRasterizer::x_of(unsigned part) const {
@@ -249,11 +253,9 @@ inline bool TileRasterizer::enter_tile() {
     // Some raster tile of it lies in the area.
     left_ = ((middle_x > area_.x0 ? 0b0101U : 0U) | (middle_x < area_.x1 ? 0b1010U : 0U)) &
             ((middle_y > area_.y0 ? 0b0011U : 0U) | (middle_y < area_.y1 ? 0b1100U : 0U));
-    kept_ = left_;
-    for (unsigned part = 0; part < 4; ++part) {
-      const bool is_outside = sign_mask(reinterpret_cast<Words>(at_tile_ + most_in_part_[part])) != 0;
-      kept_ &= ~(unsigned{is_outside} << part);
-    }
+    OfParts most{};
+    for (unsigned i = 0; i < 3; ++i) most |= most_in_parts_[i] + at_tile_[i];
+    kept_ = left_ & ~sign_mask(reinterpret_cast<Words>(most));
     tile_counted_ = false;
     return true;
   }
@@ -268,18 +270,19 @@ void TileRasterizer::tell(const QuadBeat& made) const {
 }
 
 bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) {
-  coarse_tests = 0;
+  unsigned tests = 0;
   while (true) {
     while (kept_ == 0) {
-      coarse_tests += popcount(static_cast<LaneMask>(left_));
+      tests += popcount(static_cast<LaneMask>(left_));
       left_ = 0;
       if (enter_tile()) continue;
-      raster_tiles_tested += coarse_tests;
+      coarse_tests = tests;
+      raster_tiles_tested += tests;
       return false;
     }
     const auto part = static_cast<unsigned>(__builtin_ctz(kept_));
-    const unsigned up_to_part = (2U << part) - 1;
-    coarse_tests += popcount(static_cast<LaneMask>(left_ & up_to_part));
+    const unsigned up_to_part = kept_ ^ (kept_ - 1);
+    tests += popcount(static_cast<LaneMask>(left_ & up_to_part));
     left_ &= ~up_to_part;
     kept_ &= kept_ - 1;
     if (tests_hi_z_ && is_hidden(part)) continue;
@@ -288,17 +291,19 @@ bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_scree
     out.last_of_bin = false;
     out.mark = Mark::none;
     const OfEdges value = at_tile_ + at_part_[part];
-    const std::uint64_t covered = (wide_ ? coverage_of_wide(value) : coverage_of_narrow(value)) & in_area(part);
+    std::uint64_t covered = wide_ ? coverage_of_wide(value) : coverage_of_narrow(value);
+    if (is_masked_) covered &= in_area(part);
     const std::uint32_t first = first_bits_ | 4 * quads_per_tile_row * (part >> 1U) | 4 * (part & 1U);
     out.count = static_cast<std::uint8_t>(put_covered(out.quads.data(), primitive_.splat, first, covered));
     if (by_halves_) take_by_halves(out);
     quads_rasterized.add(primitive_.draw, out.count);
     fragments_rasterized.add(primitive_.draw, static_cast<unsigned>(__builtin_popcountll(covered)));
     if (context_.fragments != nullptr) tell(out);
-    raster_tiles_tested += coarse_tests;
+    coarse_tests = tests;
+    raster_tiles_tested += tests;
     ++raster_tiles_kept;
     new_screen_tile = !tile_counted_;
-    if (new_screen_tile) ++screen_tile_pairs;
+    screen_tile_pairs += new_screen_tile ? 1 : 0;
     tile_counted_ = true;
     return true;
   }
@@ -328,10 +333,6 @@ bool TileRasterizer::is_hidden(unsigned part) {
 inline std::uint64_t TileRasterizer::in_area(unsigned part) const {
   const std::int32_t x = x_of(part);
   const std::int32_t y = y_of(part);
-  if (x >= mask_area_.x0 && y >= mask_area_.y0 && x + raster_side <= mask_area_.x1 &&
-      y + raster_side <= mask_area_.y1) {
-    return ~std::uint64_t{0};
-  }
   const auto up_to = [](std::int32_t line) { return static_cast<std::size_t>(std::clamp(line, 0, raster_side)); };
   const auto& [columns, rows] = samples_below;
   return columns[up_to(mask_area_.x1 - x)] & ~columns[up_to(mask_area_.x0 - x)] & rows[up_to(mask_area_.y1 - y)] &
@@ -340,8 +341,8 @@ inline std::uint64_t TileRasterizer::in_area(unsigned part) const {
 
 inline std::uint64_t TileRasterizer::coverage_of_narrow(const OfEdges& value) const {
   // The quads of a column in two rows at a time. No edge function may be negative inside.
-  OfEdges at_first = value < narrow_limit ? value : OfEdges{} + narrow_limit;
-  at_first = at_first > -narrow_limit ? at_first : OfEdges{} - narrow_limit;
+  const OfEdges limit = OfEdges{} + narrow_limit;
+  const OfEdges at_first = value > limit ? limit : value;
   LanePairBits upper[3];
   for (unsigned i = 0; i < 3; ++i) upper[i] = fill_[i].samples + static_cast<std::int32_t>(at_first[i]);
   std::uint64_t outside = 0;

@@ -181,6 +181,8 @@ class TileRasterizer : public RasterBehaviour {
  private:
   /// Of the three edges, a word each; the fourth has no sample outside.
   using OfEdges = std::int64_t __attribute__((vector_size(sizeof(Words))));
+  /// Of a screen tile's raster tiles, a word each.
+  using OfParts = OfEdges;
   /// Of an edge, what its function has beyond its value at a raster tile's first sample, in 32 bits.
   struct Fill {
     LanePairBits samples{};         ///< at those of the first column's upper quads
@@ -208,16 +210,17 @@ class TileRasterizer : public RasterBehaviour {
   TriangleSnapper snapper_;
   const RasterTime time_;
   bool wide_ = false;
-  OfEdges dx_{}, dy_{};           ///< where they are wide
-  OfEdges right_{};               ///< to the next screen tile
-  OfEdges below_{};               ///< and to the next row of them
-  OfEdges at_part_[4] = {};       ///< at a raster tile's first sample, from that of the screen tile
-  OfEdges most_in_part_[4] = {};  ///< at the sample where it is largest
+  OfEdges dx_{}, dy_{};            ///< where they are wide
+  OfEdges right_{};                ///< to the next screen tile
+  OfEdges below_{};                ///< and to the next row of them
+  OfEdges at_part_[4] = {};        ///< at a raster tile's first sample, from that of the screen tile
+  OfParts most_in_parts_[3] = {};  ///< of an edge, at the samples where it is largest
   Fill fill_[3];
   Primitive primitive_;
   std::uint32_t first_bits_ = 0;  ///< the upper half of the word of its quad at position 0, without coverage
   PixelRect area_;                ///< bounds of the primitive within the clip
   PixelRect mask_area_;           ///< outside which samples are masked off
+  bool is_masked_ = false;        ///< whether its screen tiles reach beyond that
   std::int32_t next_x_ = 0;       ///< the screen tile to enter next, in tiles
   std::int32_t next_y_ = 0;
   std::int32_t tile_x_begin_ = 0;
