@@ -15,6 +15,8 @@ namespace vrpipe {
 
 namespace {
 constexpr auto tile_side = static_cast<std::int32_t>(screen_tile_pixels);
+constexpr unsigned tile_bits = 4;
+static_assert(1 << tile_bits == tile_side);
 constexpr auto raster_side = static_cast<std::int32_t>(raster_tile_pixels);
 // Within a raster tile an edge function changes by at most 7 (|dx| + |dy|). Below this bound that is under 2^30: a value
 // beyond 2^30 at the tile's first sample keeps its sign over the tile, and one below -2^30 would, but then the tile is not
@@ -108,6 +110,22 @@ unsigned put_covered(Quad* out, std::uint32_t splat, std::uint32_t first, std::u
   return count;
 #endif
 }
+
+auto product(LaneBits a, LaneBits b) {
+  using Products = std::int64_t __attribute__((vector_size(sizeof(Words))));
+#if defined(__AVX2__)
+  // Only lower halves count.
+  const LanePairBits widened[] = {__builtin_shufflevector(a, LaneBits{}, 0, 4, 1, 5, 2, 6, 3, 7),
+                                  __builtin_shufflevector(b, LaneBits{}, 0, 4, 1, 5, 2, 6, 3, 7)};
+  return reinterpret_cast<Products>(__builtin_ia32_pmuldq256(widened[0], widened[1]));
+#else
+  return __builtin_convertvector(a, Products) * __builtin_convertvector(b, Products);
+#endif
+}
+template <class Integers>
+Integers magnitude(Integers value) {
+  return value < 0 ? -value : value;
+}
 }  // namespace
 
 TileRasterizer::TileRasterizer(const Parameters& parameters, const RenderContext& context)
@@ -149,11 +167,12 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
     area_ = intersection(area_, clip);
     mask_area_ = intersection(mask_area_, clip);
   }
-  tile_x_begin_ = area_.x0 / tile_side;
-  tile_x_end_ = (area_.x1 - 1) / tile_side + 1;
+  // No side is negative.
+  tile_x_begin_ = area_.x0 >> tile_bits;
+  tile_x_end_ = (area_.x1 + tile_side - 1) >> tile_bits;
   next_x_ = tile_x_begin_;
-  next_y_ = area_.y0 / tile_side;
-  tile_y_end_ = area_.empty() ? next_y_ : (area_.y1 - 1) / tile_side + 1;
+  next_y_ = area_.y0 >> tile_bits;
+  tile_y_end_ = area_.empty() ? next_y_ : (area_.y1 + tile_side - 1) >> tile_bits;
   is_masked_ = mask_area_.x0 > tile_x_begin_ * tile_side || mask_area_.x1 < tile_x_end_ * tile_side ||
                mask_area_.y0 > next_y_ * tile_side || mask_area_.y1 < tile_y_end_ * tile_side;
   left_ = kept_ = 0;
@@ -168,56 +187,50 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
     std::swap(t.x[1], t.x[2]);
     std::swap(t.y[1], t.y[2]);
   }
-  const std::int64_t step = std::int64_t{1} << context_.precision.subpixel_bits;
-  const std::int64_t half = step / 2;
-  wide_ = false;
-  std::int64_t magnitudes = 1;  // the bits of all of them together are those of the largest
-  OfEdges dx{};
-  OfEdges dy{};
-  OfEdges at_first{};
-  for (unsigned i = 0; i < 3; ++i) {
-    const unsigned j = (i + 1) % 3;
-    // Positive inside, y down: E(x, y) = (xj - xi)(y - yi) - (yj - yi)(x - xi).
-    const std::int64_t across = std::int64_t{t.x[j]} - t.x[i];
-    const std::int64_t down = std::int64_t{t.y[j]} - t.y[i];
-    const std::int64_t to_the_right = -down * step;
-    const std::int64_t to_below = across * step;
-    // A sample on an edge belongs to the triangle if the edge is a top edge (horizontal, inside below it) or a left
-    // edge (inside to its right); on any other edge it does not, which one less says in integers.
-    const bool top_left = (down == 0 && across > 0) || down < 0;
-    const std::int64_t origin = across * (half - t.y[i]) - down * (half - t.x[i]) - (top_left ? 0 : 1);
-    if (std::abs(to_the_right) + std::abs(to_below) > narrow_gradient) wide_ = true;
-    magnitudes |= std::abs(origin) + std::abs(to_the_right) * width + std::abs(to_below) * height;
-    dx[i] = to_the_right;
-    dy[i] = to_below;
-    at_first[i] = origin + to_the_right * (tile_x_begin_ * tile_side) + to_below * (next_y_ * tile_side);
-  }
-  at_next_ = at_row_ = at_first;
-  set_up_tiles(dx, dy);
+  // Positive inside, y down: E(x, y) = (xj - xi)(y - yi) - (yj - yi)(x - xi), j after i. The fourth edge is the third.
+  const unsigned bits = context_.precision.subpixel_bits;
+  const std::int32_t step = std::int32_t{1} << bits;
+  const LaneBits x{t.x[0], t.x[1], t.x[2], t.x[2]};
+  const LaneBits y{t.y[0], t.y[1], t.y[2], t.y[2]};
+  const LaneBits across = __builtin_shufflevector(x, x, 1, 2, 0, 0) - x;
+  const LaneBits down = __builtin_shufflevector(y, y, 1, 2, 0, 0) - y;
+  // A sample on an edge belongs to the triangle if the edge is a top edge (horizontal, inside below it) or a left
+  // edge (inside to its right); on any other edge it does not, which one less says in integers.
+  const LaneBits is_top_left = ((down == 0) & (across > 0)) | (down < 0);
+  const OfEdges origin = product(across, (step >> 1) - y) - product(down, (step >> 1) - x) +
+                         __builtin_convertvector(~is_top_left, OfEdges);
+  at_next_ = at_row_ = origin + product(across, LaneBits{} + next_y_ * tile_side * step) -
+                       product(down, LaneBits{} + tile_x_begin_ * tile_side * step);
+  const LaneBits wide = magnitude(across) + magnitude(down) > static_cast<std::int32_t>(narrow_gradient >> bits);
+  wide_ = sign_mask(wide) != 0;
+  const OfEdges most = magnitude(origin) + product(magnitude(down), LaneBits{} + width * step) +
+                       product(magnitude(across), LaneBits{} + height * step);
   if (wide_ && !wide_edges_gate_.enter()) wide_ = false;
   if (wide_) ++wide_edges;
-  widest_edge.see(static_cast<std::uint64_t>(65 - __builtin_clzll(static_cast<unsigned long long>(magnitudes))));
+  widest_edge.see(static_cast<std::uint64_t>(
+      65 - __builtin_clzll(static_cast<unsigned long long>(most[0] | most[1] | most[2] | 1))));
+  dx_ = product(-down, LaneBits{} + step);
+  dy_ = product(across, LaneBits{} + step);
+  set_up_tiles();
 }
 
-void TileRasterizer::set_up_tiles(const OfEdges& dx, const OfEdges& dy) {
-  dx_ = dx;
-  dy_ = dy;
-  right_ = dx * tile_side;
-  below_ = dy * tile_side;
-  at_part_[1] = raster_side * dx;
-  at_part_[2] = raster_side * dy;
+void TileRasterizer::set_up_tiles() {
+  right_ = tile_side * dx_;
+  below_ = tile_side * dy_;
+  at_part_[1] = raster_side * dx_;
+  at_part_[2] = raster_side * dy_;
   at_part_[3] = at_part_[1] + at_part_[2];
   // The largest value over a tile's samples is at the corner to which the gradient points.
-  const OfEdges reach = (raster_side - 1) * ((dx & (dx > 0)) + (dy & (dy > 0)));
+  const OfEdges reach = (raster_side - 1) * ((dx_ & (dx_ > 0)) + (dy_ & (dy_ > 0)));
   for (unsigned i = 0; i < 3; ++i) {
     most_in_parts_[i] = (OfParts{0, -1, 0, -1} & at_part_[1][i]) + (OfParts{0, 0, -1, -1} & at_part_[2][i]) + reach[i];
     // Of edges that are too wide, which are filled by these only if that effect was left out by force, the low bits.
-    const auto across = static_cast<std::int32_t>(dx[i]);
-    const auto down = static_cast<std::int32_t>(dy[i]);
+    const auto across = static_cast<std::int32_t>(dx_[i]);
+    const auto down = static_cast<std::int32_t>(dy_[i]);
     Fill& fill = fill_[i];
     fill.samples = across * LanePairBits{0, 1, 0, 1, 0, 1, 0, 1} + down * LanePairBits{0, 0, 1, 1, 2, 2, 3, 3};
-    fill.right = LanePairBits{} + static_cast<std::int32_t>(2 * dx[i]);
-    fill.below = LanePairBits{} + static_cast<std::int32_t>(4 * dy[i]);
+    fill.right = LanePairBits{} + static_cast<std::int32_t>(2 * dx_[i]);
+    fill.below = LanePairBits{} + static_cast<std::int32_t>(4 * dy_[i]);
   }
 }
 
@@ -225,7 +238,8 @@ void TileRasterizer::set_up_tiles(const OfEdges& dx, const OfEdges& dy) {
 void TileRasterizer::set_up_rectangle() {
   wide_ = false;
   at_next_ = at_row_ = OfEdges{};
-  set_up_tiles(OfEdges{}, OfEdges{});
+  dx_ = dy_ = OfEdges{};
+  set_up_tiles();
   mask_area_ = area_;
   is_masked_ = true;
 }

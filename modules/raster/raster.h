@@ -188,8 +188,8 @@ class TileRasterizer : public RasterBehaviour {
     LanePairBits samples{};         ///< at those of the first column's upper quads
     LanePairBits right{}, below{};  ///< from there to the next column, and to the lower quads
   };
-  /// @param dx, dy  change of the edge functions a pixel to the right and down
-  void set_up_tiles(const OfEdges& dx, const OfEdges& dy);
+  /// By dx_ and dy_.
+  void set_up_tiles();
   /// Samples of a raster tile that are inside, 4 bits for each of its 4x4 quads: by the values at its first one.
   std::uint64_t coverage_of_narrow(const OfEdges& value) const;
   std::uint64_t coverage_of_wide(const OfEdges& value) const;
@@ -210,7 +210,7 @@ class TileRasterizer : public RasterBehaviour {
   TriangleSnapper snapper_;
   const RasterTime time_;
   bool wide_ = false;
-  OfEdges dx_{}, dy_{};            ///< where they are wide
+  OfEdges dx_{}, dy_{};            ///< a pixel to the right, and down
   OfEdges right_{};                ///< to the next screen tile
   OfEdges below_{};                ///< and to the next row of them
   OfEdges at_part_[4] = {};        ///< at a raster tile's first sample, from that of the screen tile
