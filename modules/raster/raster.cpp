@@ -217,6 +217,8 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
 void TileRasterizer::set_up_tiles() {
   right_ = tile_side * dx_;
   below_ = tile_side * dy_;
+  next_column_ = 2 * dx_;
+  lower_quads_ = 4 * dy_;
   at_part_[1] = raster_side * dx_;
   at_part_[2] = raster_side * dy_;
   at_part_[3] = at_part_[1] + at_part_[2];
@@ -227,10 +229,7 @@ void TileRasterizer::set_up_tiles() {
     // Of edges that are too wide, which are filled by these only if that effect was left out by force, the low bits.
     const auto across = static_cast<std::int32_t>(dx_[i]);
     const auto down = static_cast<std::int32_t>(dy_[i]);
-    Fill& fill = fill_[i];
-    fill.samples = across * LanePairBits{0, 1, 0, 1, 0, 1, 0, 1} + down * LanePairBits{0, 0, 1, 1, 2, 2, 3, 3};
-    fill.right = LanePairBits{} + static_cast<std::int32_t>(2 * dx_[i]);
-    fill.below = LanePairBits{} + static_cast<std::int32_t>(4 * dy_[i]);
+    samples_[i] = across * LanePairBits{0, 1, 0, 1, 0, 1, 0, 1} + down * LanePairBits{0, 0, 1, 1, 2, 2, 3, 3};
   }
 }
 
@@ -357,18 +356,18 @@ inline std::uint64_t TileRasterizer::coverage_of_narrow(const OfEdges& value) co
   // The quads of a column in two rows at a time. No edge function may be negative inside.
   const OfEdges limit = OfEdges{} + narrow_limit;
   const OfEdges at_first = value > limit ? limit : value;
-  LanePairBits upper[3];
-  for (unsigned i = 0; i < 3; ++i) upper[i] = fill_[i].samples + static_cast<std::int32_t>(at_first[i]);
+  LanePairBits at_half[3];
+  for (unsigned i = 0; i < 3; ++i) at_half[i] = samples_[i] + static_cast<std::int32_t>(at_first[i]);
   std::uint64_t outside = 0;
   for (unsigned half = 0; half < 2; ++half) {
-    LanePairBits at[3];
-    for (unsigned i = 0; i < 3; ++i) at[i] = half == 0 ? upper[i] : upper[i] + fill_[i].below;
+    LanePairBits at[] = {at_half[0], at_half[1], at_half[2]};
     LanePairBits of_column[4];
     for (LanePairBits& any : of_column) {
       any = at[0] | at[1] | at[2];
-      for (unsigned i = 0; i < 3; ++i) at[i] += fill_[i].right;
+      for (unsigned i = 0; i < 3; ++i) at[i] += static_cast<std::int32_t>(next_column_[i]);
     }
     outside |= std::uint64_t{sign_masks(of_column)} << (32 * half);
+    for (unsigned i = 0; i < 3; ++i) at_half[i] += static_cast<std::int32_t>(lower_quads_[i]);
   }
   return ~outside;
 }

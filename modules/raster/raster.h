@@ -183,11 +183,6 @@ class TileRasterizer : public RasterBehaviour {
   using OfEdges = std::int64_t __attribute__((vector_size(sizeof(Words))));
   /// Of a screen tile's raster tiles, a word each.
   using OfParts = OfEdges;
-  /// Of an edge, what its function has beyond its value at a raster tile's first sample, in 32 bits.
-  struct Fill {
-    LanePairBits samples{};         ///< at those of the first column's upper quads
-    LanePairBits right{}, below{};  ///< from there to the next column, and to the lower quads
-  };
   /// By dx_ and dy_.
   void set_up_tiles();
   /// Samples of a raster tile that are inside, 4 bits for each of its 4x4 quads: by the values at its first one.
@@ -215,7 +210,10 @@ class TileRasterizer : public RasterBehaviour {
   OfEdges below_{};                ///< and to the next row of them
   OfEdges at_part_[4] = {};        ///< at a raster tile's first sample, from that of the screen tile
   OfParts most_in_parts_[3] = {};  ///< of an edge, at the samples where it is largest
-  Fill fill_[3];
+  // Within a raster tile, in the lower 32 bits if they are not wide:
+  LanePairBits samples_[3] = {};  ///< of an edge, at the samples of the first column's upper quads
+  OfEdges next_column_{};         ///< to those of the next column
+  OfEdges lower_quads_{};         ///< and of the lower quads
   Primitive primitive_;
   std::uint32_t first_bits_ = 0;  ///< the upper half of the word of its quad at position 0, without coverage
   PixelRect area_;                ///< bounds of the primitive within the clip
