@@ -6,6 +6,8 @@
 #include <cstring>
 #include <iterator>
 
+#include <vrpipe/arithmetic/lanes.h>
+
 namespace vrpipe {
 
 namespace {
@@ -22,9 +24,32 @@ std::int32_t to_steps(double pixels, double steps_per_pixel) {
 bool in_guard_band(const Point& point) {
   return std::fabs(point.x) <= guard_band_pixels && std::fabs(point.y) <= guard_band_pixels;
 }
-bool in_guard_band(const std::array<Point, 4>& corners) {
-  return in_guard_band(corners[0]) && in_guard_band(corners[1]) && in_guard_band(corners[2]) &&
-         in_guard_band(corners[3]);
+
+/// Of a box's corners, each side by side: the four signs of its axes in turn.
+using Four = double __attribute__((vector_size(32)));
+struct Corners {
+  Four x, y;
+};
+
+bool in_guard_band(const Corners& corners) {
+  constexpr double band = guard_band_pixels;
+  const auto inside = (corners.x <= band) & (corners.x >= -band) & (corners.y <= band) & (corners.y >= -band);
+  return sign_mask(reinterpret_cast<Words>(inside)) == all_lanes;
+}
+
+LaneBits to_steps(const Four& pixels, double steps_per_pixel) {
+  const Four steps = pixels * steps_per_pixel + 0.5;
+  // Conversion goes towards 0: one less where that is up.
+  const LaneBits towards_zero = __builtin_convertvector(steps, LaneBits);
+  return towards_zero + __builtin_convertvector(__builtin_convertvector(towards_zero, Four) > steps, LaneBits);
+}
+
+Four square_roots(const Four& squares) {
+#if defined(__AVX__)
+  return __builtin_ia32_sqrtpd256(squares);
+#else
+  return {std::sqrt(squares[0]), std::sqrt(squares[1]), std::sqrt(squares[2]), std::sqrt(squares[3])};
+#endif
 }
 
 /// The part of [-1, 1] along an axis that can reach the viewport's circumcircle.
@@ -38,53 +63,39 @@ void cut_axis(const Point& center, const Point& axis, const Point& view_center, 
   high = std::max(std::min(high, middle + view_radius / length), -1.0);
 }
 
-bool box_corners(const RenderContext& context, const DrawState& state, const Splat& splat,
-                 std::array<Point, 4>& corners) {
+bool box_corners(const RenderContext& context, const DrawState& state, const Splat& splat, Corners& corners) {
   const Point center{splat.cx, splat.cy};
-  Point a{splat.ax, splat.ay};
-  Point b{splat.bx, splat.by};
+  // x and y of the first, then of the second.
+  Four axes{splat.ax, splat.ay, splat.bx, splat.by};
   if (state.splat_extent == SplatExtent::axis_aligned_box || state.splat_extent == SplatExtent::fill_rectangle) {
-    const double half_width = std::sqrt(a.x * a.x + b.x * b.x);
-    const double half_height = std::sqrt(a.y * a.y + b.y * b.y);
-    a = {half_width, 0.0};
-    b = {0.0, half_height};
+    const Four squares = axes * axes;
+    axes = Four{std::sqrt(squares[0] + squares[2]), 0.0, 0.0, std::sqrt(squares[1] + squares[3])};
   } else if (state.splat_extent == SplatExtent::three_sigma && splat.r > 0) {
-    const double scale = 3.0 / static_cast<double>(splat.r);
-    a = {a.x * scale, a.y * scale};
-    b = {b.x * scale, b.y * scale};
+    axes *= 3.0 / static_cast<double>(splat.r);
   }
   const double padding =
       static_cast<double>(state.obb_padding) / static_cast<double>(1U << context.precision.subpixel_bits);
-  for (Point* axis : {&a, &b}) {
-    const double length = std::sqrt(axis->x * axis->x + axis->y * axis->y);
-    if (length > 0) {
-      const double scale = (length + padding) / length;
-      axis->x *= scale;
-      axis->y *= scale;
-    }
-  }
+  const Four squares = axes * axes;
+  const Four lengths = square_roots(squares + __builtin_shufflevector(squares, squares, 1, 0, 3, 2));
+  axes *= lengths > 0.0 ? (lengths + padding) / lengths : Four{} + 1.0;
   // A box of no extent has no direction; it still covers a sample that lies on its centre.
-  if (a.x == 0 && a.y == 0 && b.x == 0 && b.y == 0) {
-    a.x = padding;
-    b.y = padding;
-  }
+  if (sign_mask(reinterpret_cast<Words>(axes != 0.0)) == 0) axes = Four{padding, 0.0, 0.0, padding};
+  const auto set_corners = [&](const Four& a, const Four& b) {
+    corners = {center.x + a * axes[0] + b * axes[2], center.y + a * axes[1] + b * axes[3]};
+  };
+  set_corners(Four{-1, 1, -1, 1}, Four{-1, -1, 1, 1});
+  if (in_guard_band(corners)) return true;
   double a0 = -1;
   double a1 = 1;
   double b0 = -1;
   double b1 = 1;
-  const auto corner = [&](double u, double v) {
-    return Point{center.x + u * a.x + v * b.x, center.y + u * a.y + v * b.y};
-  };
-  const auto set_corners = [&] { corners = {corner(a0, b0), corner(a1, b0), corner(a0, b1), corner(a1, b1)}; };
-  set_corners();
-  if (in_guard_band(corners)) return true;
   const double width = context.frame->width();
   const double height = context.frame->height();
   const Point view_center{width / 2, height / 2};
   const double view_radius = 0.5 * std::sqrt(width * width + height * height) + 2.0;
-  cut_axis(center, a, view_center, view_radius, a0, a1);
-  cut_axis(center, b, view_center, view_radius, b0, b1);
-  set_corners();
+  cut_axis(center, {axes[0], axes[1]}, view_center, view_radius, a0, a1);
+  cut_axis(center, {axes[2], axes[3]}, view_center, view_radius, b0, b1);
+  set_corners(Four{a0, a1, a0, a1}, Four{b0, b0, b1, b1});
   // A box off to one side of the screen keeps a far corner only when it misses the viewport.
   return in_guard_band(corners);
 }
@@ -92,7 +103,6 @@ bool box_corners(const RenderContext& context, const DrawState& state, const Spl
 }  // namespace
 
 bool TriangleSnapper::snap(DrawIndex draw, std::uint32_t splat, unsigned triangle, SnappedTriangle& out) {
-  constexpr unsigned order[2][3] = {{0, 1, 2}, {1, 3, 2}};
   const DrawCall& call = context_.draw(draw);
   const auto steps = static_cast<double>(1U << context_.precision.subpixel_bits);
   const bool is_mesh = call.geometry->is_mesh();
@@ -108,19 +118,17 @@ bool TriangleSnapper::snap(DrawIndex draw, std::uint32_t splat, unsigned triangl
   }
   if (splat_ != splat) {
     splat_ = splat;
-    std::array<Point, 4> corners;
+    Corners corners;
     is_finite_ = box_corners(context_, call.state, call.splat(splat), corners);
-    for (unsigned corner = 0; is_finite_ && corner < 4; ++corner) {
-      x_[corner] = to_steps(corners[corner].x, steps);
-      y_[corner] = to_steps(corners[corner].y, steps);
+    if (is_finite_) {
+      x_ = to_steps(corners.x, steps);
+      y_ = to_steps(corners.y, steps);
     }
   }
-  if (!is_finite_) return false;
-  for (unsigned vertex = 0; vertex < 3; ++vertex) {
-    out.x[vertex] = x_[order[triangle][vertex]];
-    out.y[vertex] = y_[order[triangle][vertex]];
-  }
-  return true;
+  const unsigned second = triangle == 0 ? 1 : 3;
+  out.x = {x_[triangle], x_[second], x_[2]};
+  out.y = {y_[triangle], y_[second], y_[2]};
+  return is_finite_;
 }
 
 bool snap_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t splat, unsigned triangle,
@@ -139,16 +147,13 @@ std::int64_t doubled_area(const SnappedTriangle& t) {
 PixelRect covered_bounds(const SnappedTriangle& t, unsigned subpixel_bits, std::uint32_t width, std::uint32_t height) {
   const std::int32_t half = std::int32_t{1} << (subpixel_bits - 1);
   // The sample of pixel p is at p + 1/2: the first at or right of x is ceil(x - 1/2), the last at or left is floor.
-  const auto first = [&](std::int32_t v) {
-    return (v - half + (std::int32_t{1} << subpixel_bits) - 1) >> subpixel_bits;
+  const auto first = [&](const std::array<std::int32_t, 3>& of) {
+    return std::max((std::min({of[0], of[1], of[2]}) + half - 1) >> subpixel_bits, 0);
   };
-  const auto last = [&](std::int32_t v) { return (v - half) >> subpixel_bits; };
-  PixelRect bounds;
-  bounds.x0 = std::max(first(*std::min_element(t.x.begin(), t.x.end())), 0);
-  bounds.y0 = std::max(first(*std::min_element(t.y.begin(), t.y.end())), 0);
-  bounds.x1 = std::min(last(*std::max_element(t.x.begin(), t.x.end())) + 1, static_cast<std::int32_t>(width));
-  bounds.y1 = std::min(last(*std::max_element(t.y.begin(), t.y.end())) + 1, static_cast<std::int32_t>(height));
-  return bounds;
+  const auto end = [&](const std::array<std::int32_t, 3>& of, std::uint32_t size) {
+    return std::min(((std::max({of[0], of[1], of[2]}) - half) >> subpixel_bits) + 1, static_cast<std::int32_t>(size));
+  };
+  return {first(t.x), first(t.y), end(t.x, width), end(t.y, height)};
 }
 
 bool is_finite(const Splat& splat) {

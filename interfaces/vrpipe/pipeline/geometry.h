@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 
+#include <vrpipe/arithmetic/lanes.h>
 #include <vrpipe/pipeline/payload.h>
 #include <vrpipe/pipeline/render_context.h>
 
@@ -31,7 +32,7 @@ class TriangleSnapper {
   const RenderContext& context_;
   std::uint32_t splat_ = ~0U;  ///< of the box
   bool is_finite_ = false;
-  std::array<std::int32_t, 4> x_{}, y_{};  ///< its corners
+  LaneBits x_{}, y_{};  ///< its corners
 };
 
 /// Whether a draw's splats are a rectangle each: one primitive, which covers its bounds. Its snapped triangle has the corners
