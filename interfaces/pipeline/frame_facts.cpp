@@ -20,7 +20,7 @@ class FrameFacts::Boxes {
   /// In pixels; a sample's rounding to the sub-pixel grid is within a pixel.
   void add(double x0, double y0, double x1, double y1) {
     const auto tile = [](double pixels, std::uint32_t tiles) {
-      return static_cast<std::uint32_t>(std::clamp(pixels / screen_tile_pixels, 0.0, double{1} * tiles));
+      return static_cast<std::uint32_t>(std::clamp(std::floor(pixels / screen_tile_pixels), 0.0, double{1} * tiles));
     };
     if (x1 < -1 || y1 < -1) return;
     const std::uint32_t left = tile(x0 - 1, width_);

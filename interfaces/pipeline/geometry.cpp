@@ -37,19 +37,23 @@ bool in_guard_band(const Corners& corners) {
   return sign_mask(reinterpret_cast<Words>(inside)) == all_lanes;
 }
 
-LaneBits to_steps(const Four& pixels, double steps_per_pixel) {
-  const Four steps = pixels * steps_per_pixel + 0.5;
-  // Conversion goes towards 0: one less where that is up.
-  const LaneBits towards_zero = __builtin_convertvector(steps, LaneBits);
-  return towards_zero + __builtin_convertvector(__builtin_convertvector(towards_zero, Four) > steps, LaneBits);
+Four floors(const Four& values) {
+#if defined(__AVX__)
+  return __builtin_ia32_roundpd256(values, 1);
+#else
+  return {std::floor(values[0]), std::floor(values[1]), std::floor(values[2]), std::floor(values[3])};
+#endif
 }
-
 Four square_roots(const Four& squares) {
 #if defined(__AVX__)
   return __builtin_ia32_sqrtpd256(squares);
 #else
   return {std::sqrt(squares[0]), std::sqrt(squares[1]), std::sqrt(squares[2]), std::sqrt(squares[3])};
 #endif
+}
+
+LaneBits to_steps(const Four& pixels, double steps_per_pixel) {
+  return __builtin_convertvector(floors(pixels * steps_per_pixel + 0.5), LaneBits);
 }
 
 /// The part of [-1, 1] along an axis that can reach the viewport's circumcircle.
@@ -63,9 +67,30 @@ void cut_axis(const Point& center, const Point& axis, const Point& view_center, 
   high = std::max(std::min(high, middle + view_radius / length), -1.0);
 }
 
+/// @param axes  x and y of the first, then of the second
+Corners corners_of(const Point& center, const Four& axes, const Four& a, const Four& b) {
+  return {center.x + a * axes[0] + b * axes[2], center.y + a * axes[1] + b * axes[3]};
+}
+
+/// The corners of the part of a box that can be seen. A box off to one side of the screen keeps a far corner only when it
+/// misses the viewport.
+[[gnu::noinline]] bool cut_box(const RenderContext& context, const Point& center, const Four& axes, Corners& corners) {
+  const double width = context.frame->width();
+  const double height = context.frame->height();
+  const Point view_center{width / 2, height / 2};
+  const double view_radius = 0.5 * std::sqrt(width * width + height * height) + 2.0;
+  double a0 = -1;
+  double a1 = 1;
+  double b0 = -1;
+  double b1 = 1;
+  cut_axis(center, {axes[0], axes[1]}, view_center, view_radius, a0, a1);
+  cut_axis(center, {axes[2], axes[3]}, view_center, view_radius, b0, b1);
+  corners = corners_of(center, axes, Four{a0, a1, a0, a1}, Four{b0, b0, b1, b1});
+  return in_guard_band(corners);
+}
+
 bool box_corners(const RenderContext& context, const DrawState& state, const Splat& splat, Corners& corners) {
   const Point center{splat.cx, splat.cy};
-  // x and y of the first, then of the second.
   Four axes{splat.ax, splat.ay, splat.bx, splat.by};
   if (state.splat_extent == SplatExtent::axis_aligned_box || state.splat_extent == SplatExtent::fill_rectangle) {
     const Four squares = axes * axes;
@@ -80,33 +105,27 @@ bool box_corners(const RenderContext& context, const DrawState& state, const Spl
   axes *= lengths > 0.0 ? (lengths + padding) / lengths : Four{} + 1.0;
   // A box of no extent has no direction; it still covers a sample that lies on its centre.
   if (sign_mask(reinterpret_cast<Words>(axes != 0.0)) == 0) axes = Four{padding, 0.0, 0.0, padding};
-  const auto set_corners = [&](const Four& a, const Four& b) {
-    corners = {center.x + a * axes[0] + b * axes[2], center.y + a * axes[1] + b * axes[3]};
-  };
-  set_corners(Four{-1, 1, -1, 1}, Four{-1, -1, 1, 1});
-  if (in_guard_band(corners)) return true;
-  double a0 = -1;
-  double a1 = 1;
-  double b0 = -1;
-  double b1 = 1;
-  const double width = context.frame->width();
-  const double height = context.frame->height();
-  const Point view_center{width / 2, height / 2};
-  const double view_radius = 0.5 * std::sqrt(width * width + height * height) + 2.0;
-  cut_axis(center, {axes[0], axes[1]}, view_center, view_radius, a0, a1);
-  cut_axis(center, {axes[2], axes[3]}, view_center, view_radius, b0, b1);
-  set_corners(Four{a0, a1, a0, a1}, Four{b0, b0, b1, b1});
-  // A box off to one side of the screen keeps a far corner only when it misses the viewport.
-  return in_guard_band(corners);
+  corners = corners_of(center, axes, Four{-1, 1, -1, 1}, Four{-1, -1, 1, 1});
+  return in_guard_band(corners) || cut_box(context, center, axes, corners);
 }
 
 }  // namespace
 
+void TriangleSnapper::snap_box(const DrawCall& call, std::uint32_t splat) {
+  splat_ = splat;
+  Corners corners;
+  is_finite_ = box_corners(context_, call.state, call.splat(splat), corners);
+  if (!is_finite_) return;
+  const auto steps = static_cast<double>(1U << context_.precision.subpixel_bits);
+  x_ = to_steps(corners.x, steps);
+  y_ = to_steps(corners.y, steps);
+}
+
 bool TriangleSnapper::snap(DrawIndex draw, std::uint32_t splat, unsigned triangle, SnappedTriangle& out) {
   const DrawCall& call = context_.draw(draw);
-  const auto steps = static_cast<double>(1U << context_.precision.subpixel_bits);
   const bool is_mesh = call.geometry->is_mesh();
   if (const ScreenTriangle* const given = call.triangle(splat); is_mesh || given != nullptr) {
+    const auto steps = static_cast<double>(1U << context_.precision.subpixel_bits);
     for (unsigned vertex = 0; vertex < 3; ++vertex) {
       const MeshVertex* const of_mesh = is_mesh ? &call.mesh_triangle(splat).vertices[vertex] : nullptr;
       const Point point = is_mesh ? Point{of_mesh->x, of_mesh->y} : Point{given->x[vertex], given->y[vertex]};
@@ -116,15 +135,7 @@ bool TriangleSnapper::snap(DrawIndex draw, std::uint32_t splat, unsigned triangl
     }
     return true;
   }
-  if (splat_ != splat) {
-    splat_ = splat;
-    Corners corners;
-    is_finite_ = box_corners(context_, call.state, call.splat(splat), corners);
-    if (is_finite_) {
-      x_ = to_steps(corners.x, steps);
-      y_ = to_steps(corners.y, steps);
-    }
-  }
+  if (splat_ != splat) snap_box(call, splat);
   const unsigned second = triangle == 0 ? 1 : 3;
   out.x = {x_[triangle], x_[second], x_[2]};
   out.y = {y_[triangle], y_[second], y_[2]};

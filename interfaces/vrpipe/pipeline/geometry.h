@@ -29,6 +29,7 @@ class TriangleSnapper {
   bool snap(DrawIndex draw, std::uint32_t splat, unsigned triangle, SnappedTriangle& out);
 
  private:
+  [[gnu::noinline]] void snap_box(const DrawCall& call, std::uint32_t splat);
   const RenderContext& context_;
   std::uint32_t splat_ = ~0U;  ///< of the box
   bool is_finite_ = false;
