@@ -41,14 +41,14 @@ Four floors(const Four& values) {
 #if defined(__AVX__)
   return __builtin_ia32_roundpd256(values, 1);
 #else
-  return {std::floor(values[0]), std::floor(values[1]), std::floor(values[2]), std::floor(values[3])};
+  return Four{std::floor(values[0]), std::floor(values[1]), std::floor(values[2]), std::floor(values[3])};
 #endif
 }
 Four square_roots(const Four& squares) {
 #if defined(__AVX__)
   return __builtin_ia32_sqrtpd256(squares);
 #else
-  return {std::sqrt(squares[0]), std::sqrt(squares[1]), std::sqrt(squares[2]), std::sqrt(squares[3])};
+  return Four{std::sqrt(squares[0]), std::sqrt(squares[1]), std::sqrt(squares[2]), std::sqrt(squares[3])};
 #endif
 }
 

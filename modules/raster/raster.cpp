@@ -26,8 +26,7 @@ constexpr std::int64_t narrow_limit = std::int64_t{1} << 30;
 
 static_assert(offsetof(Quad, position) == 4 && offsetof(Quad, coverage) == 5);
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
-// In the upper half of a quad's word, in which its position is lowest:
-constexpr unsigned coverage_shift = 8;
+// In the upper half of a quad's word, in which its position is lowest and its coverage follows in byte 1:
 constexpr unsigned triangle_shift = 16;
 constexpr unsigned draw_shift = 17;
 /// Of a raster tile's quads row by row: the position, from the first one's.
@@ -103,7 +102,7 @@ unsigned put_covered(Quad* out, std::uint32_t splat, std::uint32_t first, std::u
   unsigned count = 0;
   for (unsigned quad = 0; quad < 16; ++quad) {
     const auto covered = static_cast<std::uint32_t>(coverage >> (4 * quad) & all_lanes);
-    const std::uint64_t bits = splat | std::uint64_t{first + place_of(quad) + (covered << coverage_shift)} << 32U;
+    const std::uint64_t bits = splat | std::uint64_t{first + place_of(quad) + (covered << 8U)} << 32U;
     std::memcpy(static_cast<void*>(out + count), &bits, sizeof bits);
     count += covered != 0 ? 1U : 0U;
   }
