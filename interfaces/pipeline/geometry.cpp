@@ -169,14 +169,13 @@ PixelRect covered_bounds(const SnappedTriangle& t, unsigned subpixel_bits, std::
 
 bool is_finite(const Splat& splat) {
   // Of all fields but the depth, by their exponents: all at once, since every splat is asked for.
-  constexpr unsigned fields = sizeof(Splat) / sizeof(std::uint32_t);
-  constexpr std::uint32_t exponent = 0x7f800000;
-  std::uint32_t bits[fields];
-  std::memcpy(bits, &splat, sizeof bits);
-  bits[offsetof(Splat, depth) / sizeof(std::uint32_t)] = 0;
-  std::uint32_t any = 0;
-  for (const std::uint32_t each : bits) any |= (each & exponent) == exponent ? 1U : 0U;
-  return any == 0;
+  static_assert(sizeof(Splat) == 3 * sizeof(LaneBits) && offsetof(Splat, depth) == 7 * sizeof(float));
+  constexpr LaneBits exponent = {0x7f800000, 0x7f800000, 0x7f800000, 0x7f800000};
+  constexpr LaneBits but_depth = {-1, -1, -1, 0};
+  LaneBits fields[3];
+  std::memcpy(fields, &splat, sizeof fields);
+  return sign_mask(((fields[0] & exponent) == exponent) | ((fields[1] & but_depth & exponent) == exponent) |
+                   ((fields[2] & exponent) == exponent)) == 0;
 }
 
 bool is_finite(const MeshTriangle& triangle) {
