@@ -19,8 +19,8 @@ constexpr unsigned tile_bits = 4;
 static_assert(1 << tile_bits == tile_side);
 constexpr auto raster_side = static_cast<std::int32_t>(raster_tile_pixels);
 // Within a raster tile an edge function changes by at most 7 (|dx| + |dy|). Below this bound that is under 2^30: a value
-// beyond 2^30 at the tile's first sample keeps its sign over the tile, and one below -2^30 would, but then the tile is not
-// kept. So 32 bits are exact after clamping.
+// beyond 2^30 at the tile's first sample is above 0 all over the tile, which it is as well if clamped, and none is below
+// -2^30, where all of the tile is outside. So 32 bits are exact.
 constexpr std::int64_t narrow_gradient = (std::int64_t{1} << 30) / 7;
 constexpr std::int64_t narrow_limit = std::int64_t{1} << 30;
 

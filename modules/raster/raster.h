@@ -179,7 +179,7 @@ class TileRasterizer : public RasterBehaviour {
   Counter wide_edges{*this, "wide_edges", "primitives", "that need 64-bit edge functions inside a raster tile"};
 
  private:
-  /// Of the three edges, a word each; the fourth has no sample outside.
+  /// Of the three edges, a word each; the fourth has no sample outside that the third has inside.
   using OfEdges = std::int64_t __attribute__((vector_size(sizeof(Words))));
   /// Of a screen tile's raster tiles, a word each.
   using OfParts = OfEdges;
