@@ -46,9 +46,9 @@ const std::vector<std::pair<EffectChoice::Base, const char*>>& bases() {
 /// @param names  what else may stand where the name does
 const Effect& effect_or_word(const std::string& full_name, std::vector<std::string> names) {
   for (const Effect& effect : effect_list()) {
-    if (effect.full_name() == full_name) return effect;
-    names.push_back(effect.full_name());
+    if (effect.is_named(full_name)) return effect;
   }
+  for (const Effect& effect : effect_list()) names.push_back(effect.full_name());
   throw UserError("unknown effect '" + full_name + "'", "--effects", "nothing declares it",
                   suggestion(full_name, names, "`vrpipe units --effects` lists all"));
 }
@@ -68,7 +68,7 @@ void add_effect(Effect effect) {
       return call_foreign(what, "decide", 0, [&] { return decide(asked); });
     };
   }
-  if (std::any_of(all.begin(), all.end(), [&](const Effect& known) { return known.full_name() == name; })) {
+  if (std::any_of(all.begin(), all.end(), [&](const Effect& known) { return known.is_named(name); })) {
     return Registry::instance().add_problem({"there is an effect '" + name + "' already", "choose another name"});
   }
   const auto place = std::upper_bound(all.begin(), all.end(), name, [](const std::string& added, const Effect& other) {
@@ -147,7 +147,7 @@ bool OmittedEffects::has_part(const std::string& part) const { return !contains(
 EffectGate::EffectGate(const RenderContext& context, const char* full_name) : effects_(context.effects) {
   if (effects_ == nullptr) return;
   omitted_ = effects_->find(full_name);
-  const auto is_it = [&](const Effect& effect) { return effect.full_name() == full_name; };
+  const auto is_it = [&](const Effect& effect) { return effect.is_named(full_name); };
   if (omitted_ == nullptr && std::none_of(effects().begin(), effects().end(), is_it))
     throw SimulationFault(std::string("effect ") + full_name, 0, "it has a gate, and nothing declares it");
 }

@@ -94,7 +94,7 @@ class CropTime {
     return {joins ? group_.lengthened_by(price_, parts_of_a_cycle) : std::max(parts_of_a_cycle, price_), joins};
   }
   /// Whether there is time for it in a cycle to which the blender is `open`.
-  bool is_free(const Price& price, Cycle now) const { return done_ + price.parts <= parts_until(now + 1); }
+  bool is_free(const Price& price, Cycle now) const { return price.parts <= parts_left(now); }
   /// The first cycle from `ready` on in which there is.
   Cycle free_from(const Price& price, Cycle ready) const {
     const std::int64_t end = std::max(done_, earliest(ready)) + price.parts;
@@ -139,12 +139,13 @@ class CropTime {
   /// Whether a line may go while quads wait to be blended into it.
   bool fetches_ahead() const { return fetch_ahead_quads > 0; }
   Price price() const { return {price_, false}; }
-  /// Where quads are alike: one is blended in a cycle to which the blender is open, or so many from the first one on in which there is
-  /// time; returns the cycles of the first and of the last.
-  void blend(Cycle now) {
-    done_ += price_;
+  /// Where quads are alike: what is left of a cycle to which the blender is open, and so many that fit there are blended in it.
+  std::int64_t parts_left(Cycle now) const { return parts_until(now + 1) - done_; }
+  void blend(unsigned quads, Cycle now) {
+    done_ += quads * price_;
     last_blend_ = now;
   }
+  /// Or so many from the first cycle on in which there is time; returns the cycles of the first and of the last.
   [[gnu::always_inline]] std::pair<Cycle, Cycle> blend_all(unsigned quads, Cycle ready) {
     const Cycle first = free_from(price(), ready);
     idle_until(first);
@@ -158,11 +159,7 @@ class CropTime {
   /// beside a blend of several cycles. `at` does not go back.
   bool move(unsigned sectors, Cycle at) {
     const std::int64_t parts = sectors * sector_price_;
-    while (idle_cache_.size() > 1 && idle_cache_[1].at <= at) idle_cache_.pop();
-    if (!idle_cache_.empty() && idle_cache_.front().at <= at && idle_cache_.front().parts >= parts) {
-      idle_cache_.front().parts -= parts;
-      return false;
-    }
+    if (!idle_cache_.empty() && moves_beside(parts, at)) return false;
     open(at);
     done_ += parts;
     return true;
@@ -224,6 +221,14 @@ class CropTime {
   unsigned looked_up_at_once() const;
 
  private:
+  /// Whether the cache is idle for so long beside the last blend of several cycles.
+  [[gnu::noinline]] bool moves_beside(std::int64_t parts, Cycle at) {
+    while (idle_cache_.size() > 1 && idle_cache_[1].at <= at) idle_cache_.pop();
+    Idle& idle = idle_cache_.front();
+    if (idle.at > at || idle.parts < parts) return false;
+    idle.parts -= parts;
+    return true;
+  }
   /// Up to what is done now. Of a read lt is told before the blender is idle for the 64th time since.
   [[gnu::noinline]] void keep_idle(std::int64_t from) {
     if (!idle_.empty() && idle_.back().until == from) {

@@ -54,6 +54,10 @@ class CropUnit : public Unit {
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &port_.socket(); }
   MemoryBytes memory_bytes() const override { return port_.moved(); }
+  void close_account(Cycle end) override {
+    count_look_ups();
+    Unit::close_account(end);
+  }
   bool ends_frame() const override { return true; }
   Cycle end_of_frame() const override { return end_; }
 
@@ -114,17 +118,15 @@ class CropUnit : public Unit {
   }
   /// For the host: what blending a quad will touch was last touched long ago. Inlined, since GCC drops calls of
   /// functions that do nothing but prefetch.
-  [[gnu::always_inline]] void prefetch(const ColorQuad& quad, std::size_t place) const {
+  [[gnu::always_inline]] void prefetch(std::size_t place) const {
     __builtin_prefetch(&surface_->quad(place), 1);
-    __builtin_prefetch(&quad.color());
-    if (quad.index == 0) __builtin_prefetch(&quad.warp->first_primitive);
     monitor_->prefetch(place);
   }
   [[gnu::always_inline]] Entry& queue(const ColorQuad& quad, std::uint32_t line, std::uint32_t sectors,
                                       std::size_t place) {
     // In place: a temporary of narrow stores would be waited for when it is copied.
     Entry& entry = queue_.push();
-    prefetch(quad, place);
+    prefetch(place);
     entry.quad = quad;
     entry.line = line;
     entry.sectors = sectors;
@@ -224,7 +226,7 @@ class CropUnit : public Unit {
         moved = true;
       }
       if (at_ == beat.count) {
-        port_.cache().accessed(at_, at_ * sectors_of_a_quad_);
+        looked_up_ += at_;
         in_.pop();
         at_ = 0;
       }
@@ -242,6 +244,7 @@ class CropUnit : public Unit {
     stop_ = UnitState::starved;
     const bool marked = !marks_.empty();
     unsigned budget = time_.most_in_a_cycle;
+    std::int64_t left = Plain ? time_.parts_left(now) : 0;
     for (; budget > 0 && !queue_.empty(); --budget) {
       if (marked) pass_marks(now);
       const Entry& entry = queue_.front();
@@ -256,7 +259,7 @@ class CropUnit : public Unit {
       }
       const CropTime::Quad priced = Plain ? CropTime::Quad{} : priced_quad(entry);
       const CropTime::Price price = Plain ? time_.price() : time_.price_of(priced, std::min(waits_from_, now));
-      if (!time_.is_free(price, now)) {
+      if (Plain ? price.parts > left : !time_.is_free(price, now)) {
         stop_ = UnitState::busy;  // with the quads before it, or with moving sectors
         waits_from_ = std::min(waits_from_, now);
         break;
@@ -279,8 +282,12 @@ class CropUnit : public Unit {
       }
       if (!Plain && tells_draws()) draw_lasts(quad.warp->draw[quad.index], now + time_.latency_cycles);
       if (quad.is_last()) quad.warp->release();
-      Plain ? time_.blend(now) : time_.blend(priced, price, now);
-      waits_from_ = never;
+      if (Plain) {
+        left -= price.parts;
+      } else {
+        time_.blend(priced, price, now);
+        waits_from_ = never;
+      }
       leave(entry, outcome.changed || time_.writes_unchanged);
       queue_.pop();
       if (marked && !marks_.empty()) --marks_.front().quads;
@@ -288,6 +295,7 @@ class CropUnit : public Unit {
     if (beat.count > 0) out_.push(beat);
     const unsigned blended = time_.most_in_a_cycle - budget;
     if (blended == 0) return false;
+    if (Plain) time_.blend(blended, now);
     any_blended_ = true;
     frame_lasts(now + time_.latency_cycles);
     did(CropWork::blend, blended, now);
@@ -325,8 +333,13 @@ class CropUnit : public Unit {
     port_.cache().unpin(entry.line);
   }
 
+  void count_look_ups() {
+    port_.cache().accessed(looked_up_, looked_up_ * sectors_of_a_quad_);
+    looked_up_ = 0;
+  }
   /// Behind the quads in the queue.
   [[gnu::noinline]] void queue_mark(Mark mark) {
+    count_look_ups();
     std::size_t behind = queue_.size();
     for (std::size_t i = 0; i < marks_.size(); ++i) behind -= marks_[i].quads;
     marks_.push({mark, behind});
@@ -390,11 +403,12 @@ class CropUnit : public Unit {
   CachePort port_;
   const ColorSurface* surface_ = nullptr;
   std::optional<BlendOrderMonitor> monitor_;
-  unsigned line_shift_ = 0;   ///< log2 of the bytes of a line
-  Ring<Entry> queue_;         ///< looked up and waiting to be blended
-  unsigned at_ = 0;           ///< quads taken of the beat at the link
-  CachePort::LookUp wanted_;  ///< of the quad at the link
-  TileId tile_;               ///< of the last quad that was looked up
+  unsigned line_shift_ = 0;      ///< log2 of the bytes of a line
+  Ring<Entry> queue_;            ///< looked up and waiting to be blended
+  unsigned at_ = 0;              ///< quads taken of the beat at the link
+  std::uint64_t looked_up_ = 0;  ///< of the beats before, not counted by the cache yet
+  CachePort::LookUp wanted_;     ///< of the quad at the link
+  TileId tile_;                  ///< of the last quad that was looked up
   std::size_t tile_place_ = 0;
   std::uint64_t tile_address_ = 0;
   // Where tags run ahead of data:

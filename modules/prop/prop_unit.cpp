@@ -108,13 +108,13 @@ class PropUnit : public Unit {
     }
     if (out_color_.credits() == 0) return false;
     ColorBeat beat;
+    unsigned in_beat = 0;
     bool moved = false;
     unsigned sent = 0;
     const unsigned allowance = color_limit_.allowance(now);
     while (sent < allowance) {
-      if (beat.count == ColorBeat::capacity) {
-        out_color_.push(beat);
-        beat.count = 0;
+      if (in_beat == ColorBeat::capacity) {
+        push(beat, std::exchange(in_beat, 0));
         if (out_color_.credits() == 0) break;
       }
       if (current_.warp == nullptr) {
@@ -125,7 +125,7 @@ class PropUnit : public Unit {
       }
       const ShadedWarp& warp = *current_.warp;
       if (index_ < warp.count) {
-        beat.quads[beat.count++] = {&warp, index_++};
+        beat.quads[in_beat++] = {&warp, index_++};
         ++sent;
       }
       if (index_ == warp.count) {
@@ -146,10 +146,14 @@ class PropUnit : public Unit {
       did(PropWork::color, sent, now);
       color_limit_.take(sent);
     }
-    if (beat.count > 0) out_color_.push(beat);
+    if (in_beat > 0) push(beat, in_beat);
     return sent > 0 || moved || (current_.warp == nullptr && pass_mark());
   }
 
+  void push(ColorBeat& beat, unsigned count) {
+    beat.count = static_cast<std::uint8_t>(count);
+    out_color_.push(beat);
+  }
   /// Whether there is a warp to hand to CROP.
   bool has_next() { return tests_late_ ? has_next_beside_late() : order_.has_next(); }
   [[gnu::noinline]] bool has_next_beside_late() const {

@@ -30,7 +30,7 @@ class QuadLanes {
   }
 
   /// Hands on those that have a live thread, one behind the other, but for their colours. `live`: a bit a thread.
-  void put_live(std::uint32_t live, bool several_draws, ShadedWarp& out) const {
+  [[gnu::always_inline]] void put_live(std::uint32_t live, bool several_draws, ShadedWarp& out) const {
     const LanePairBits live_lanes = spread(live);
     const unsigned quads = sign_mask(live_lanes != 0);
     out.count = static_cast<std::uint8_t>(__builtin_popcount(quads));

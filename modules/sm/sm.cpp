@@ -150,7 +150,7 @@ inline LanePair SplatShader::alpha_at(LanePair x, LanePair y, const Shape& splat
   return select(alpha > alpha_max, LanePair{} + alpha_max, alpha);
 }
 
-inline void SplatShader::count(const Warp& warp, const Threads& threads) {
+[[gnu::always_inline]] inline void SplatShader::count(const Warp& warp, const Threads& threads) {
   fragments_of_back_quads += threads_in(threads.live & (threads.merged_quads * all_lanes));
   // The threads of each draw, most often of one.
   for (std::uint32_t left = ~0U >> (4 * (quads_per_warp - warp.count)); left != 0;) {

@@ -37,7 +37,7 @@ class RateLimit {
       tokens_ = std::min(most, tokens_ + (now - next_ + 1) * rate_.items);
       next_ = now + 1;
     }
-    return static_cast<std::uint32_t>(tokens_ / rate_.cycles);
+    return static_cast<std::uint32_t>(rate_.cycles == 1 ? tokens_ : tokens_ / rate_.cycles);
   }
   /// `count` items go: not more than the allowance of the cycle.
   void take(std::uint32_t count) { tokens_ -= std::uint64_t{count} * rate_.cycles; }

@@ -186,8 +186,7 @@ struct MemoryLatency {
   std::uint32_t spread = 0;  ///< that a quarter of either half takes less, and a quarter more
   std::uint32_t of(const MemoryRequest& request) const {
     const std::uint32_t more = request.origin.traffic == MemoryTraffic::color ? color : 0;
-    const std::uint32_t mean = (is_near(request.address) ? near : far) + more;
-    return spread == 0 ? mean : mean + static_cast<std::uint32_t>(steps_of(request.address)) * spread;
+    return more + (near == far && spread == 0 ? far : of_slice(request.address));
   }
   /// The least of all.
   std::uint32_t least() const { return std::min(near, far) - spread; }
@@ -195,6 +194,9 @@ struct MemoryLatency {
   static bool is_near(std::uint64_t address) { return parity(address, {1, 4, 8}) != 0; }
 
  private:
+  std::uint32_t of_slice(std::uint64_t address) const {
+    return (is_near(address) ? near : far) + static_cast<std::uint32_t>(steps_of(address)) * spread;
+  }
   /// -1, 0 or 1: how its slice lies to the mean of its half. Says three quarters of the variance of those tiles.
   static int steps_of(std::uint64_t address) {
     constexpr std::array<int, 8> steps{0, -1, 1, 0, -1, 0, 0, -1};

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <vrpipe/component/parameter.h>
@@ -75,6 +76,12 @@ struct Effect {
   std::function<EffectDecision(const EffectQuestion&)> decide;
 
   std::string full_name() const { return component + "." + name; }
+  /// Whether that is its full name.
+  bool is_named(std::string_view full) const {
+    const std::size_t dot = component.size();
+    return full.size() == dot + 1 + name.size() && full[dot] == '.' && full.substr(0, dot) == component &&
+           full.substr(dot + 1) == name;
+  }
 };
 
 /// All effects of what is linked in or loaded, in the order of their full names by component. A second one of a name is a

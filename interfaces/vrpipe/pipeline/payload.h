@@ -185,10 +185,10 @@ struct WarpRelease {
 };
 
 /// One quad on its way to blending. Quads of a warp stay in order, and whoever takes the last off the pipeline releases
-/// the warp.
+/// the warp. Like a `Quad` without values unless it begins with braces.
 struct ColorQuad {
-  const ShadedWarp* warp = nullptr;
-  std::uint32_t index = 0;  ///< in the warp
+  const ShadedWarp* warp;
+  std::uint32_t index;  ///< in the warp
   unsigned position() const { return warp->position[index]; }
   LaneMask live() const { return warp->live[index]; }
   const QuadColor& color() const { return warp->color[index]; }
