@@ -324,7 +324,7 @@ template class ColorRop<ColorFormat::srgb8, BlendRounding::rtz>;
 namespace {
 const SlotRegistrar crop_slot{
     {"crop", 100, "color-rop", "", true, check_crop},
-    {{"latency_cycles", 1, 200}, {"cache_bytes", 1024, 1 << 24}},
+    {},
     {{"out_done", [](const RenderContext& context) { return BarrierPlan(context).is_used(); },
       "a draw of the frame reads the colour target, and nobody tells DRAW when all before it is blended",
       "connect it to draw.in_done_N, as wire_gpc does"}}};

@@ -10,6 +10,7 @@ class AnnotatedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
   Port(unsigned index, AnnotatedL2& l2, unsigned bytes_per_cycle)
       : socket(("port_" + std::to_string(index)).c_str()),
         l2_(l2),
+        index_(index),
         requests_(bytes_per_cycle),
         responses_(bytes_per_cycle) {
     socket.bind(*this);
@@ -44,7 +45,7 @@ class AnnotatedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
     const Cycle from = std::max(arrival, requests_.take(arrival, in, now) - 1);
     ++lines_;
     waited_ += from - arrival;
-    const Served served = l2.passes(request) ? l2_.pass(request, from) : l2_.look_up(request, from);
+    const Served served = l2.passes(request) ? l2_.pass(request, index_, from) : l2_.look_up(request, index_, from);
     return std::max(responses_.take(served.from, out, now), served.there);
   }
   const ClockDomain& clock() const override { return *l2_.clock.domain; }
@@ -67,6 +68,7 @@ class AnnotatedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
   unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
 
   AnnotatedL2& l2_;
+  const unsigned index_;
   BandwidthReservation requests_;
   BandwidthReservation responses_;
   std::uint64_t lines_ = 0, waited_ = 0;
@@ -81,9 +83,10 @@ AnnotatedL2::AnnotatedL2(const sc_core::sc_module_name& name, ClockDomain& domai
       behaviour_(std::move(behaviour)),
       crossing_(domain, behaviour_->clock().period_ps()),
       sizes_(behaviour_->sizes()),
+      takes_turns_(ports.size() > 1 && !sizes_.oldest_first),
       cache_(behaviour_->cache()),
       memory_(*this, "below"),
-      banks_(sizes_.banks, Bank(sizes_)),
+      banks_(sizes_.banks, Bank(sizes_, ports.size())),
       fills_(std::size_t{cache_.organization().lines()} * cache_.organization().sectors_of_a_line()),
       counted_fills_(behaviour_->statistics()) {
   for (const unsigned bytes : ports) {
@@ -119,12 +122,12 @@ std::uint64_t AnnotatedL2::write_back(const LineAccess& done, Bank& bank, Cycle 
   return moved;
 }
 
-AnnotatedL2::Served AnnotatedL2::pass(const MemoryRequest& access, Cycle arrival) {
+AnnotatedL2::Served AnnotatedL2::pass(const MemoryRequest& access, unsigned port, Cycle arrival) {
   Bank& bank = banks_[behaviour_->bank_of(access.address)];
   const Cycle begin = bank.write_backs.free_from(arrival);
   const Cycle done = write(behaviour_->below_as(access), bank, begin + 1);
   const std::uint32_t cycles = behaviour_->bank_cycles(access.bytes);
-  const Cycle from = std::max(done, occupy(bank, arrival, begin, cycles) - cycles);
+  const Cycle from = std::max(done, occupy(bank, port, arrival, begin, cycles) - cycles);
   return {from, from + cycles};
 }
 
@@ -166,27 +169,27 @@ AnnotatedL2::Wait AnnotatedL2::fetch(const MemoryRequest& access, const LineAcce
   return wait;
 }
 
-AnnotatedL2::Served AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival) {
+AnnotatedL2::Served AnnotatedL2::look_up(const MemoryRequest& access, unsigned port, Cycle arrival) {
   const std::uint32_t cycles = behaviour_->bank_cycles(access.bytes);
   std::uint32_t sectors = 0;
   const SectoredCache::Line line = behaviour_->hit(access, sectors);
-  if (line == SectoredCache::no_line) return wait(access, behaviour_->look_up(access), arrival, cycles);
+  if (line == SectoredCache::no_line) return wait(access, behaviour_->look_up(access), port, arrival, cycles);
   if (cache_.note(line) > arrival) {
     LineAccess hit;
     hit.line = line;
     hit.sectors = sectors;
-    return wait(access, hit, arrival, cycles);
+    return wait(access, hit, port, arrival, cycles);
   }
-  const Cycle done = occupy(banks_[behaviour_->bank_of_line(line)], arrival, arrival, cycles);
+  const Cycle done = occupy(banks_[behaviour_->bank_of_line(line)], port, arrival, arrival, cycles);
   return {done - cycles, done};
 }
 
-AnnotatedL2::Served AnnotatedL2::wait(const MemoryRequest& access, const LineAccess& done, Cycle arrival,
+AnnotatedL2::Served AnnotatedL2::wait(const MemoryRequest& access, const LineAccess& done, unsigned port, Cycle arrival,
                                       std::uint32_t cycles) {
   Bank& bank = banks_[behaviour_->bank_of_line(done.line)];
   const Wait wait = fetch(access, done, bank, arrival);
   const std::uint32_t moving = behaviour_->bank_cycles(wait.moved);
-  const Cycle from = std::max(wait.all_there, occupy(bank, arrival, wait.begin, moving) - moving);
+  const Cycle from = std::max(wait.all_there, occupy(bank, port, arrival, wait.begin, moving) - moving);
   return {from, from + cycles};
 }
 

@@ -45,20 +45,29 @@ class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private 
   };
   struct Bank {
     static std::uint32_t most(std::uint32_t places) { return std::min(places, 65535U); }
-    explicit Bank(const SectoredL2::Sizes& sizes) : mshrs(most(sizes.mshrs)), write_backs(most(sizes.write_backs)) {}
-    BandwidthReservation time{1};  ///< whole cycles
+    Bank(const SectoredL2::Sizes& sizes, std::size_t ports)
+        : of_port(ports, BandwidthReservation(1)), mshrs(most(sizes.mshrs)), write_backs(most(sizes.write_backs)) {}
+    BandwidthReservation time{1};               ///< whole cycles
+    std::vector<BandwidthReservation> of_port;  ///< of what waits, as if each had the bank for itself
     PlaceReservation mshrs, write_backs;
+    Cycle stuck_until = 0;     ///< by requests that waited for places: it takes no other then
     std::uint64_t cycles = 0;  ///< in which it moves bytes
   };
   /// Whether a request needs sectors of a line that are on their way in a cycle.
   static bool awaits(const Fill* fills, std::uint32_t sectors, Cycle at);
   /// Writes what a line held that goes; returns the bytes.
   std::uint64_t write_back(const LineAccess& done, Bank& bank, Cycle at);
-  /// Keeps a bank for so many cycles from one on, and for the time until `begin` before; the first in which they are over.
-  Cycle occupy(Bank& bank, Cycle from, Cycle begin, std::uint32_t cycles) {
+  /// Keeps a bank for a port for so many cycles from one on, and for the time until `begin` before; the first in which they
+  /// are over.
+  Cycle occupy(Bank& bank, unsigned port, Cycle from, Cycle begin, std::uint32_t cycles) {
     const auto waits = begin > from ? static_cast<unsigned>(begin - from - bank.time.reserved_between(from, begin)) : 0;
     bank.cycles += cycles;
-    return bank.time.take(from, waits + cycles, now());
+    const Cycle over = bank.time.take(from, waits + cycles, now());
+    bank.stuck_until = std::max(bank.stuck_until, waits > 0 ? begin : 0);
+    if (!takes_turns_ || over <= from + 2 * cycles) return over;
+    // Behind those of its own that wait, each with one of another port, and no longer, though as much of the bank's time has been
+    // taken: who comes later waits for that.
+    return std::min(over, bank.of_port[port].take(std::max(from, bank.stuck_until), 2 * cycles, now()));
   }
   /// What a request waits for that does not find all that it needs.
   struct Wait {
@@ -73,12 +82,12 @@ class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private 
     Cycle from;   ///< its bank has begun on it
     Cycle there;  ///< the first cycle in which it has its data
   };
-  Served look_up(const MemoryRequest& access, Cycle arrival);
+  Served look_up(const MemoryRequest& access, unsigned port, Cycle arrival);
   /// One that did not find all that it needs; its own bytes take the bank so many cycles.
-  [[gnu::noinline]] Served wait(const MemoryRequest& access, const LineAccess& done, Cycle arrival,
+  [[gnu::noinline]] Served wait(const MemoryRequest& access, const LineAccess& done, unsigned port, Cycle arrival,
                                 std::uint32_t cycles);
   /// One that goes below without a look-up, and is served when that has it.
-  Served pass(const MemoryRequest& access, Cycle arrival);
+  Served pass(const MemoryRequest& access, unsigned port, Cycle arrival);
   /// The present.
   Cycle now() const { return crossing_.edge_of(clock.domain->now()); }
   /// An access to the memory below.
@@ -91,6 +100,7 @@ class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private 
   std::unique_ptr<SectoredL2> behaviour_;
   const ClockCrossing crossing_;
   const SectoredL2::Sizes& sizes_;
+  const bool takes_turns_;  ///< ports do, at a bank
   SectoredCache& cache_;
   TimedMemoryPort memory_;
   std::vector<std::unique_ptr<Port>> ports_;

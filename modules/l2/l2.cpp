@@ -17,7 +17,7 @@ namespace {
 const SlotRegistrar slot_of_l1{{"l1", 105, "sectored-cache", "", false, nullptr, true}};
 // At lt a warp's neighbouring sectors are one access, with one header, and who asks does not wait for a place at the port.
 const SlotRegistrar slot_of_l2{{"l2", 110, "fixed-latency", "", true, nullptr, true},
-                               {{"latency_cycles", 1, 1000}, {"header_bytes", 1, 64}, {"port_requests", 8, 65536}}};
+                               {{"header_bytes", 1, 64}, {"port_requests", 8, 65536}}};
 const Registrar<FixedLatency, MemoryBehaviour> fixed_latency(
     "l2", "fixed-latency", "holds everything: a fixed latency, a number of bytes a cycle for each GPC", false,
     Trust::trusted);

@@ -89,8 +89,7 @@ bool TileCoalescing::flush_oldest(FlushReason reason, Flush& out) {
 }
 
 namespace {
-const SlotRegistrar tc_slot{{"tc", 50, "tile-coalescing", "", false, check_tc},
-                            {{"bins", 2, 65536}, {"bin_quads", 8, 4096}}};
+const SlotRegistrar tc_slot{{"tc", 50, "tile-coalescing", "", false, check_tc}};
 const Registrar<TileCoalescing, TcBehaviour> registrar("tc", "tile-coalescing", "bins of quads, one per screen tile",
                                                        false, Trust::trusted);
 const EffectRegistrar eviction_effect{

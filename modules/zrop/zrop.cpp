@@ -165,9 +165,7 @@ void DepthStencilRop::pass(Mark mark) {
 }
 
 namespace {
-const SlotRegistrar zrop_slot{{"zrop", 70, "depth-stencil-rop", "", true, check_zrop},
-                              {{"latency_cycles", 1, 200}},
-                              {way_of_late_tests()}};
+const SlotRegistrar zrop_slot{{"zrop", 70, "depth-stencil-rop", "", true, check_zrop}, {}, {way_of_late_tests()}};
 const Registrar<DepthStencilRop, ZropBehaviour> registrar(
     "zrop", "depth-stencil-rop", "depth, stencil and termination tests, termination update on the stencil MSB", false,
     Trust::trusted);

@@ -74,10 +74,10 @@ TEST(StressedRequest, WhatCannotBeIsRefused) {
 }
 
 TEST(ValidatedRange, NamesTheParameterThatLiesOutside) {
-  EXPECT_EQ(outside_validated_range({{"sm.cores", "4"}, {"l2.latency_cycles", "1000"}}), std::vector<std::string>{});
-  EXPECT_EQ(outside_validated_range({{"sm.cores", "1"}, {"l2.latency_cycles", "1001"}}),
+  EXPECT_EQ(outside_validated_range({{"sm.cores", "4"}, {"l2.header_bytes", "64"}}), std::vector<std::string>{});
+  EXPECT_EQ(outside_validated_range({{"sm.cores", "1"}, {"l2.header_bytes", "65"}}),
             (std::vector<std::string>{"sm.cores=1 is below 4, the least that was validated",
-                                      "l2.latency_cycles=1001 is above 1000, the most that was validated"}));
+                                      "l2.header_bytes=65 is above 64, the most that was validated"}));
 }
 
 TEST(ValidatedRange, IsAskedWhereTimeIsApproximate) {

@@ -255,6 +255,21 @@ TEST_P(L2AtEachFidelity, BanksWorkSideBySideAndOneAfterTheOtherInThemselves) {
   EXPECT_EQ(second(2 * line_bytes), 200 + hit_cycles + 1);
 }
 
+TEST_P(L2AtEachFidelity, APortWithOneRequestDoesNotWaitForAllThatAnotherHasAtABank) {
+  constexpr std::size_t many = 30;
+  constexpr Cycle cycles_of_one = 128 / 32;
+  // All hit in bank 0.
+  std::vector<Access> of_busy_port{write(10, 0, 128), write(20, 2 * line_bytes, 128)};
+  of_busy_port.insert(of_busy_port.end(), many, read(200, 0, 128));
+  const auto one = [&](const char* arbitration) {
+    start();
+    set("arbitration", arbitration);
+    return run(GetParam(), {of_busy_port, {read(220, 2 * line_bytes)}})[1].back();
+  };
+  EXPECT_LE(one("round-robin"), 220 + hit_cycles + cycles_of_one);
+  EXPECT_GE(one("oldest"), 200 + hit_cycles + 20 * cycles_of_one);
+}
+
 TEST_P(L2AtEachFidelity, APortPassesItsBytesACycle) {
   const std::vector<Cycle> completed =
       run(GetParam(), {write(10, 0), write(20, line_bytes), read(200, 0), read(200, line_bytes)});
