@@ -54,10 +54,6 @@ class CropUnit : public Unit {
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &port_.socket(); }
   MemoryBytes memory_bytes() const override { return port_.moved(); }
-  void close_account(Cycle end) override {
-    count_look_ups();
-    Unit::close_account(end);
-  }
   bool ends_frame() const override { return true; }
   Cycle end_of_frame() const override { return end_; }
 
@@ -226,7 +222,7 @@ class CropUnit : public Unit {
         moved = true;
       }
       if (at_ == beat.count) {
-        looked_up_ += at_;
+        port_.cache().accessed(at_, at_ * sectors_of_a_quad_);
         in_.pop();
         at_ = 0;
       }
@@ -333,13 +329,8 @@ class CropUnit : public Unit {
     port_.cache().unpin(entry.line);
   }
 
-  void count_look_ups() {
-    port_.cache().accessed(looked_up_, looked_up_ * sectors_of_a_quad_);
-    looked_up_ = 0;
-  }
   /// Behind the quads in the queue.
   [[gnu::noinline]] void queue_mark(Mark mark) {
-    count_look_ups();
     std::size_t behind = queue_.size();
     for (std::size_t i = 0; i < marks_.size(); ++i) behind -= marks_[i].quads;
     marks_.push({mark, behind});
@@ -403,12 +394,11 @@ class CropUnit : public Unit {
   CachePort port_;
   const ColorSurface* surface_ = nullptr;
   std::optional<BlendOrderMonitor> monitor_;
-  unsigned line_shift_ = 0;      ///< log2 of the bytes of a line
-  Ring<Entry> queue_;            ///< looked up and waiting to be blended
-  unsigned at_ = 0;              ///< quads taken of the beat at the link
-  std::uint64_t looked_up_ = 0;  ///< of the beats before, not counted by the cache yet
-  CachePort::LookUp wanted_;     ///< of the quad at the link
-  TileId tile_;                  ///< of the last quad that was looked up
+  unsigned line_shift_ = 0;   ///< log2 of the bytes of a line
+  Ring<Entry> queue_;         ///< looked up and waiting to be blended
+  unsigned at_ = 0;           ///< quads taken of the beat at the link
+  CachePort::LookUp wanted_;  ///< of the quad at the link
+  TileId tile_;               ///< of the last quad that was looked up
   std::size_t tile_place_ = 0;
   std::uint64_t tile_address_ = 0;
   // Where tags run ahead of data:

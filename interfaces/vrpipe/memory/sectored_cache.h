@@ -149,7 +149,7 @@ class SectoredCache {
   std::uint64_t missed() const { return missed_; }
   /// Ends so many accesses, which need so many sectors: those for which nothing was allocated or missed since the
   /// accesses before were hits.
-  void accessed(std::uint64_t accesses, std::uint64_t sectors) {
+  [[gnu::always_inline]] void accessed(std::uint64_t accesses, std::uint64_t sectors) {
     statistics_->line_accesses += accesses;
     statistics_->line_hits += accesses - allocated_;
     statistics_->sector_accesses += sectors;
