@@ -373,10 +373,8 @@ void SplatShader::shade_pairs(const Warp& warp, Threads& threads, ShadedWarp& ou
 }
 
 namespace {
-// With few cores SMs bound most draws, and L2 gets what they ask for in another order at lt. Warps that go to another core each
-// may find a part of its schedulers alone, which is as far as another order of warps can take a draw.
-const SlotRegistrar sm_slot{{"sm", 90, "splat-shader", "", true, check_sm},
-                            {{"cores", 4, 1024}, {"warps_to_one_core", 4, 256}}};
+// With few cores SMs bound most draws, and L2 gets what they ask for in another order at lt.
+const SlotRegistrar sm_slot{{"sm", 90, "splat-shader", "", true, check_sm}, {{"cores", 4, 1024}}};
 const Registrar<SplatShader, SmBehaviour> registrar("sm", "splat-shader",
                                                     "Gaussian splatting shaders with alpha pruning and quad merging",
                                                     false, Trust::trusted, true);

@@ -5,6 +5,7 @@
 #include "sm/hand_over.h"
 #include "sm/timed_scheduler.h"
 #include "sm/timed_sm_memory.h"
+#include "sm/warp_slots.h"
 
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/model/timed.h>
@@ -49,13 +50,12 @@ class TimedSm : public TimedUnit {
                      }),
         hand_over_(time_, context),
         schedulers_(time_.schedulers()),
-        free_of_core_(time_.cores, time_.warps_per_core),
+        slots_(time_),
         vertex_slots_(time_.vertex_warps),
         barriers_(context),
         vertices_wait_(context.placement.gpcs == 1) {
     fragment_.for_each([&](const Program& each) { waiting_.resize(std::max(waiting_.size(), each.size())); });
     if (!EffectGate(context, "cache.details").is_active()) l1_statistics_.leave_out_details();
-    free_slots_ = time_.fragment_slots();
     in_release_.set_comes_ahead();
     in_warps_.set_comes_ahead();
   }
@@ -68,7 +68,7 @@ class TimedSm : public TimedUnit {
   MemoryBytes memory_bytes() const override { return memory_.moved(); }
   void close_account(Cycle end) override {
     for (; !releases_.empty(); releases_.pop())
-      active_.released(releases_.front().core, std::min(end, releases_.front().at));
+      active_.released(slots_.core_of(releases_.front().slot), std::min(end, releases_.front().at));
     active_.close(end);
     TimedUnit::close_account(end);
   }
@@ -135,7 +135,7 @@ class TimedSm : public TimedUnit {
 
   bool has_slot() const { return has_slot_before(never); }
   bool has_slot_before(Cycle cycle) const {
-    return free_slots_ > 0 || (!releases_.empty() && releases_.front().at <= cycle);
+    return slots_.any() || (!releases_.empty() && releases_.front().at <= cycle);
   }
 
   /// Until the first slot is released, by what is done before it, too.
@@ -152,32 +152,14 @@ class TimedSm : public TimedUnit {
     }
   }
 
-  /// Puts a slot of the next core that has one under a warp, from `at` on or as soon as one is released.
-  Cycle take_slot(TileId tile, Cycle at) {
-    if (free_slots_ == 0) at = std::max(at, releases_.front().at);
+  /// The first cycle, from `at` on, in which a slot is free; those released till then are.
+  Cycle release_until(Cycle at) {
+    if (!slots_.any()) at = std::max(at, releases_.front().at);
     for (; !releases_.empty() && releases_.front().at <= at; releases_.pop()) {
-      ++free_of_core_[releases_.front().core];
-      ++free_slots_;
-      active_.released(releases_.front().core, releases_.front().at);
+      slots_.release(releases_.front().slot);
+      active_.released(slots_.core_of(releases_.front().slot), releases_.front().at);
     }
-    if (!(tile == last_tile_ && sent_to_core_ < time_.warps_to_one_core && free_of_core_[core_] > 0)) {
-      do {
-        core_ = core_ + 1 == time_.cores ? 0 : core_ + 1;
-      } while (free_of_core_[core_] == 0);
-      sent_to_core_ = 0;
-    }
-    last_tile_ = tile;
-    ++sent_to_core_;
-    --free_of_core_[core_];
-    --free_slots_;
-    active_.launched(core_, at);
     return at;
-  }
-
-  std::size_t next_scheduler() {
-    const std::size_t next = std::size_t{core_} * time_.schedulers_per_core + turn_of_scheduler_;
-    turn_of_scheduler_ = turn_of_scheduler_ + 1 == time_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
-    return next;
   }
 
   Cycle launch(const Warp& warp, Cycle visible) {
@@ -195,12 +177,15 @@ class TimedSm : public TimedUnit {
       in_release_.ask(launch);
     }
     if (!has_slot_before(next_event())) wait_for_slot(launch);
-    launch = take_slot(warp.tile, hand_over_.is_on() ? hand_over_.free_from(launch) : launch);
+    launch = release_until(hand_over_.is_on() ? hand_over_.free_from(launch) : launch);
+    const std::uint32_t slot = slots_.take(warp.tile);
+    const std::uint32_t core = slots_.core_of(slot);
+    active_.launched(core, launch);
     charge(UnitState::blocked, launch);
     while (next_vertex_event() <= launch) do_vertex_event();
     Cycle there = 0;
     if (fetches_) {
-      const TimedSmMemory::Fetch fetch = memory_.fetch_attributes(warp, core_, launch);
+      const TimedSmMemory::Fetch fetch = memory_.fetch_attributes(warp, core, launch);
       charge(UnitState::memory, fetch.looked_up);
       launch = fetch.looked_up;
       there = fetch.there;
@@ -214,16 +199,15 @@ class TimedSm : public TimedUnit {
 
     const Program& needed = fragment_.of(warp);
     if (roomy_) {
-      const Cycle done = issue(needed.front(), next_scheduler(), launch, there);
+      const Cycle done = issue(needed.front(), slots_.scheduler_of(slot), launch, there);
       last_done_ = std::max(last_done_, done);
-      shade(warp, core_, done);
+      shade(warp, slot, done);
       return launch;
     }
     issue_until(launch);
     const std::uint32_t flight = take_flight(warp);
     flights_[flight].program = &needed;
-    flights_[flight].scheduler = next_scheduler();
-    flights_[flight].core = core_;
+    flights_[flight].slot = slot;
     flights_[flight].there = there;
     issue({launch, flight}, 0);
     return launch;
@@ -233,8 +217,7 @@ class TimedSm : public TimedUnit {
   struct Flight {
     Warp warp;
     const Program* program = nullptr;
-    std::size_t scheduler = 0;
-    std::uint32_t core = 0;
+    std::uint32_t slot = 0;
     Cycle there = 0;  ///< its attributes
   };
   std::uint32_t take_flight(const Warp& warp) {
@@ -272,7 +255,8 @@ class TimedSm : public TimedUnit {
   /// The same for a warp that waits; those that waited for its scheduler before it have issued.
   void issue(const Event& warp, std::size_t segment) {
     const Flight& flight = flights_[warp.flight];
-    const Cycle next = issue((*flight.program)[segment], flight.scheduler, warp.at, segment == 0 ? flight.there : 0);
+    const Cycle next =
+        issue((*flight.program)[segment], slots_.scheduler_of(flight.slot), warp.at, segment == 0 ? flight.there : 0);
     if (++segment < flight.program->size()) {
       waiting_[segment].push_in_order({next, warp.flight}, &Event::at);
       next_issue_ = std::min(next_issue_, next);
@@ -305,12 +289,12 @@ class TimedSm : public TimedUnit {
     issue_until(until);
     for (; !done_.empty() && done_.front().at <= until; done_.pop()) {
       const Flight& flight = flights_[done_.front().flight];
-      shade(flight.warp, flight.core, done_.front().at);
+      shade(flight.warp, flight.slot, done_.front().at);
       free_flights_.push_back(done_.front().flight);
     }
   }
 
-  [[gnu::always_inline]] void shade(const Warp& warp, std::uint32_t core, Cycle done) {
+  [[gnu::always_inline]] void shade(const Warp& warp, std::uint32_t slot, Cycle done) {
     ShadedWarp& shaded = pool_.take();
     if (warp.mark != Mark::none) {
       shaded.mark = warp.mark;
@@ -320,7 +304,7 @@ class TimedSm : public TimedUnit {
     } else {
       behaviour_->shade(warp, shaded);
       if (shaded.count < warp.count) quads_last(done + 1, warp.count, [&](unsigned i) { return warp.quads[i].draw; });
-      shaded.slot = static_cast<std::uint16_t>(core);
+      shaded.slot = static_cast<std::uint16_t>(slot);
     }
     out_shaded_.send({&shaded}, done);
   }
@@ -434,14 +418,13 @@ class TimedSm : public TimedUnit {
   Cycle next_issue_ = never;          ///< the first of those that wait
   struct Release {
     Cycle at = 0;
-    std::uint32_t core = 0;
+    std::uint32_t slot = 0;
   };
   Ring<Release> releases_;  ///< of slots for fragment warps, by cycle, that no launch has come after yet
-  std::vector<std::uint32_t> free_of_core_;
-  std::uint32_t free_slots_ = 0;  ///< of all cores
-  SlotPool vertex_slots_;         ///< of those that have been handed on
-  Ring<VertexFlight> vertices_;   ///< that have not, in order
-  std::size_t shaded_ = 0;        ///< of these, from the first on
+  WarpSlots slots_;
+  SlotPool vertex_slots_;        ///< of those that have been handed on
+  Ring<VertexFlight> vertices_;  ///< that have not, in order
+  std::size_t shaded_ = 0;       ///< of these, from the first on
   std::size_t written_ = 0;
   const BarrierPlan barriers_;  ///< DRAW waits for them
   const bool vertices_wait_;    ///< to be handed on; across GPCs what comes behind them follows the order of calls
@@ -450,10 +433,6 @@ class TimedSm : public TimedUnit {
   Cycle vertices_done_ = 0;
   Cycle next_launch_ = 0;
   Cycle last_done_ = 0;
-  TileId last_tile_;
-  std::uint32_t core_ = 0;
-  std::uint32_t sent_to_core_ = 0;
-  std::uint32_t turn_of_scheduler_ = 0;
   ShadedWarpPool pool_;
 };
 

@@ -5,8 +5,8 @@
 #include "sm/fragment_programs.h"
 #include "sm/hand_over.h"
 #include "sm/sm_memory.h"
+#include "sm/warp_slots.h"
 
-#include <vrpipe/arithmetic/divisor.h>
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/model/unit.h>
@@ -100,7 +100,7 @@ class SmUnit : public Unit {
         behaviour_(std::move(behaviour)),
         time_(behaviour_->time()),
         cycles_per_instruction_(time_.cycles_per_instruction()),
-        warps_per_core_(time_.warps_per_core),
+        slots_(time_),
         memory_(*this, context, time_, l1_statistics_),
         fetch_gate_(context, "sm.attribute_fetch"),
         hand_over_(time_, context),
@@ -113,17 +113,10 @@ class SmUnit : public Unit {
     in_release_.set_answers();
     if (!EffectGate(context, "cache.details").is_active()) l1_statistics_.leave_out_details();
     fragment_slots_ = time_.fragment_slots();
-    free_slots_ = fragment_slots_;
     flights_.resize(fragment_slots_ + time_.vertex_warps);
     next_.resize(flights_.size() + schedulers_.size());
     warps_.resize(fragment_slots_);
     vertices_.resize(time_.vertex_warps);
-    free_of_core_.resize(time_.cores);
-    for (std::uint32_t core = 0; core < time_.cores; ++core) {
-      for (std::uint32_t slot = time_.warps_per_core; slot-- > 0;) {
-        free_of_core_[core].push_back(core * time_.warps_per_core + slot);
-      }
-    }
   }
 
   bool idle() const override {
@@ -291,11 +284,9 @@ class SmUnit : public Unit {
     for (; in_release_.ready(); in_release_.pop()) {
       const std::uint32_t slot = in_release_.front().slot;
       if (slot == no_slot) continue;
-      const auto core = static_cast<std::uint32_t>(warps_per_core_.quotient(slot));
-      free_of_core_[core].push_back(slot);
-      ++free_slots_;
+      slots_.release(slot);
       --in_flight_;
-      active_.released(core, now);
+      active_.released(slots_.core_of(slot), now);
     }
   }
 
@@ -317,16 +308,6 @@ class SmUnit : public Unit {
     --vertex_count_;
   }
 
-  bool choose_core(TileId tile) {
-    if (free_slots_ == 0) return false;
-    if (tile == last_tile_ && sent_to_core_ < time_.warps_to_one_core && !free_of_core_[core_].empty()) return true;
-    do {
-      core_ = core_ + 1 == time_.cores ? 0 : core_ + 1;
-    } while (free_of_core_[core_].empty());
-    sent_to_core_ = 0;
-    return true;
-  }
-
   [[gnu::noinline]] void pass_mark() {
     ShadedWarp& mark = pool_.take();
     mark.mark = in_warps_.front().mark;
@@ -344,29 +325,22 @@ class SmUnit : public Unit {
     if (warp.mark != Mark::none) return pass_mark();
     if (hand_over_.is_on() && !hand_over_.is_free(now)) return;
     if (!looks_up_) {
-      if (!choose_core(warp.tile)) {
-        slots_full_ = true;
-        return;
-      }
-      last_tile_ = warp.tile;
-      ++sent_to_core_;
-      slot_ = free_of_core_[core_].back();
-      free_of_core_[core_].pop_back();
-      --free_slots_;
+      slots_full_ = !slots_.any();
+      if (slots_full_) return;
+      slot_ = slots_.take(warp.tile);
     }
     const std::uint32_t slot = slot_;
     if (fetches_ && !look_up(slot, warp, now)) return;
     Flight& flight = flights_[slot];
     flight.program = &fragment_.of(warp);
     flight.segment = 0;
-    flight.scheduler = static_cast<std::uint16_t>(core_ * time_.schedulers_per_core + turn_of_scheduler_);
-    turn_of_scheduler_ = turn_of_scheduler_ + 1 == time_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
+    flight.scheduler = static_cast<std::uint16_t>(slots_.scheduler_of(slot));
     warps_[slot] = warp;
     if (hand_over_.is_on()) pay_for_launch(warp, now);
     in_warps_.pop();
     ++in_flight_;
     ++running_;
-    active_.launched(core_, now);
+    active_.launched(slots_.core_of(slot), now);
     make_ready(slot, now);
   }
 
@@ -378,7 +352,7 @@ class SmUnit : public Unit {
 
   /// Looks a warp's attributes up; false if that takes longer than this cycle.
   [[gnu::noinline]] bool look_up(std::uint32_t slot, const Warp& warp, Cycle now) {
-    if (!looks_up_) memory_.begin_look_up(slot, core_, warp);
+    if (!looks_up_) memory_.begin_look_up(slot, slots_.core_of(slot), warp);
     looks_up_ = !memory_.look_up(now);
     there_[slot] = time_.fetch.has_l1() ? now + time_.fetch.l1_latency_cycles : now;
     return !looks_up_;
@@ -442,7 +416,7 @@ class SmUnit : public Unit {
   std::unique_ptr<SmBehaviour> behaviour_;
   const SmTime time_;
   const std::uint32_t cycles_per_instruction_;
-  const Divisor warps_per_core_;
+  WarpSlots slots_;
   SectoredCacheStatistics l1_statistics_{*this, "l1"};
   ActiveCores active_{*this, time_.cores};
   SmMemory memory_;
@@ -462,17 +436,11 @@ class SmUnit : public Unit {
   std::vector<std::uint32_t> next_;   ///< in a chain, of slots and then of schedulers
   std::vector<Warp> warps_;           ///< of fragment slots
   std::vector<VertexWarp> vertices_;  ///< of vertex slots
-  std::vector<std::vector<std::uint32_t>> free_of_core_;
-  std::uint32_t free_slots_ = 0;    ///< of all cores
-  std::uint32_t vertex_first_ = 0;  ///< of the vertex warps in flight, in order
+  std::uint32_t vertex_first_ = 0;    ///< of the vertex warps in flight, in order
   std::uint32_t vertex_count_ = 0;
   Ring<const ShadedWarp*> completed_;
   ShadedWarpPool pool_;
-  TileId last_tile_;
-  std::uint32_t core_ = 0;
   std::uint32_t slot_ = 0;
-  std::uint32_t sent_to_core_ = 0;
-  std::uint32_t turn_of_scheduler_ = 0;
   std::uint64_t vertex_scheduler_ = 0;
   std::uint32_t in_flight_ = 0;  ///< fragment warps, up to their release
   std::uint32_t running_ = 0;    ///< of these, not shaded yet

@@ -141,8 +141,7 @@ TEST(ExpectedError, IsLargeWhereNoUnitHidesThatRequestsWait) {
   const RunResult hidden = at_lt_on("agx-orin", settings);
   EXPECT_GT(hidden.bottleneck->occupancy, 0.95);
   EXPECT_LT(*hidden.expected_error_percent, 3);
-  settings.push_back({"crop", "bytes_per_cycle", "128"});
-  settings.push_back({"prop", "color_bytes_per_cycle", "128"});
+  settings.push_back({"sm", "warps_per_core", "16"});
   const RunResult seen = at_lt_on("agx-orin", settings);
   EXPECT_LT(seen.bottleneck->occupancy, 0.92);
   EXPECT_GT(*seen.expected_error_percent, 3);

@@ -162,6 +162,14 @@ TEST_P(SmTimedTest, ConsecutiveWarpsOfATileGoToOneCore) {
   }
 }
 
+TEST_P(SmTimedTest, WarpsThatAlternateBetweenCoresFindAllSchedulersOfEach) {
+  TimedSmBench sm(GetParam(), context, {{"cores", "2"}, {"schedulers_per_core", "2"}, {"warps_to_one_core", "1"}});
+  for (std::uint32_t i = 0; i < 4; ++i) sm.warps.add(warp(i), 10);
+  sm.run();
+  for (std::uint32_t i = 0; i < 4; ++i)
+    EXPECT_EQ(sm.cycles[i], 11 + i + fragment_cycles + 1) << "alone on its scheduler";
+}
+
 TEST_P(SmTimedTest, VerticesComeBackInOrderAfterTheirShader) {
   Bench bench(GetParam(), "sm", "splat-shader", context);
   Source<VertexWarp>& in = bench.source<VertexWarp>("in_vertices");
