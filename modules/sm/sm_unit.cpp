@@ -113,8 +113,9 @@ class SmUnit : public Unit {
     in_release_.set_answers();
     if (!EffectGate(context, "cache.details").is_active()) l1_statistics_.leave_out_details();
     fragment_slots_ = time_.fragment_slots();
-    flights_.resize(fragment_slots_ + time_.vertex_warps);
-    next_.resize(flights_.size() + schedulers_.size());
+    first_scheduler_ = fragment_slots_ + time_.vertex_warps;
+    flights_.resize(first_scheduler_);
+    next_.resize(first_scheduler_ + schedulers_.size());
     warps_.resize(fragment_slots_);
     vertices_.resize(time_.vertex_warps);
   }
@@ -195,7 +196,7 @@ class SmUnit : public Unit {
   void arm(std::uint32_t index, Cycle now) {
     Scheduler& scheduler = schedulers_[index];
     if (scheduler.ready.empty() || scheduler.event_pending) return;
-    wheel_.add(std::max(scheduler.free_at, now + 1), static_cast<std::uint32_t>(flights_.size()) + index, next_);
+    wheel_.add(std::max(scheduler.free_at, now + 1), first_scheduler_ + index, next_);
     scheduler.event_pending = true;
   }
 
@@ -212,7 +213,7 @@ class SmUnit : public Unit {
       const std::uint32_t turn = slot - fragment_slots_;
       if (lacks_fetch_) fetch_gate_.enter();
       behaviour_->shade_and_count(vertices_[turn]);
-      flights_[slot].done = !fetches_ || !memory_.write_attributes(turn, vertices_[turn]);
+      if (!fetches_ || !memory_.write_attributes(turn, vertices_[turn])) finish_vertex_warp(turn);
       return;
     }
     --running_;
@@ -228,8 +229,8 @@ class SmUnit : public Unit {
     // Events are only ever added to later cycles.
     for (std::uint32_t who = wheel_.take(now), following = nobody; who != nobody; who = following) {
       following = next_[who];
-      if (who >= flights_.size()) {
-        const auto index = static_cast<std::uint32_t>(who - flights_.size());
+      if (who >= first_scheduler_) {
+        const std::uint32_t index = who - first_scheduler_;
         schedulers_[index].event_pending = false;
         issue(schedulers_[index], now);
         arm(index, now);
@@ -296,9 +297,7 @@ class SmUnit : public Unit {
       out_shaded_.push({completed_.front()});
       completed_.pop();
     }
-    while (vertex_count_ > 0 && flights_[fragment_slots_ + vertex_first_].done && out_vertices_.credits() > 0) {
-      send_vertex_warp();
-    }
+    while (first_vertex_warp_done_ && out_vertices_.credits() > 0) send_vertex_warp();
   }
 
   // Vertex warps are few, so what they need is kept out of the way of the others.
@@ -306,6 +305,11 @@ class SmUnit : public Unit {
     out_vertices_.push(vertices_[vertex_first_]);
     vertex_first_ = vertex_first_ + 1 == time_.vertex_warps ? 0 : vertex_first_ + 1;
     --vertex_count_;
+    first_vertex_warp_done_ = vertex_count_ > 0 && flights_[fragment_slots_ + vertex_first_].done;
+  }
+  void finish_vertex_warp(std::uint32_t turn) {
+    flights_[fragment_slots_ + turn].done = true;
+    first_vertex_warp_done_ |= turn == vertex_first_;
   }
 
   [[gnu::noinline]] void pass_mark() {
@@ -365,8 +369,8 @@ class SmUnit : public Unit {
     vertices_[turn] = in_vertices_.front();
     in_vertices_.pop();
     Flight& flight = flights_[slot];
-    flight.done = vertices_[turn].mark != Mark::none;
-    if (flight.done) return;
+    flight.done = false;
+    if (vertices_[turn].mark != Mark::none) return finish_vertex_warp(turn);
     flight.program = &vertex_;
     flight.segment = 0;
     flight.scheduler = static_cast<std::uint16_t>(vertex_scheduler_++ % schedulers_.size());
@@ -381,7 +385,7 @@ class SmUnit : public Unit {
     run_events(now);
     launch_fragments(now);
     if (vertex_count_ < time_.vertex_warps && in_vertices_.ready()) launch_vertex_warp(now);
-    if (fetches_) memory_.send([this](std::uint32_t turn) { flights_[fragment_slots_ + turn].done = true; });
+    if (fetches_) memory_.send([this](std::uint32_t turn) { finish_vertex_warp(turn); });
     send();
 
     const Cycle next_event = wheel_.next_after(now);
@@ -396,10 +400,10 @@ class SmUnit : public Unit {
     } else {
       enter(UnitState::starved, now);
     }
+    if (next_event == now + 1) return next_event;
     Cycle next = next_event;
     if (busy_until_ > now) next = std::min(next, busy_until_);
     if (fetches_) next = std::min(next, memory_.next_completion());
-    if (next == now + 1) return next;
     // What could not be taken for want of a slot, a credit or an answer waits for the port that brings one.
     if (!slots_full_ && !(looks_up_ && in_warps_.ready())) {
       next = std::min(next, std::max(in_warps_.next_ready(), hand_over_.free_from(now + 1)));
@@ -431,13 +435,15 @@ class SmUnit : public Unit {
   Wheel wheel_;
   std::vector<Scheduler> schedulers_;
   std::uint32_t fragment_slots_ = 0;
-  std::vector<Flight> flights_;       ///< fragment slots, core by core, then vertex slots
-  std::vector<Cycle> there_;          ///< by fragment slot: before it no attributes are there
-  std::vector<std::uint32_t> next_;   ///< in a chain, of slots and then of schedulers
-  std::vector<Warp> warps_;           ///< of fragment slots
-  std::vector<VertexWarp> vertices_;  ///< of vertex slots
-  std::uint32_t vertex_first_ = 0;    ///< of the vertex warps in flight, in order
+  std::uint32_t first_scheduler_ = 0;  ///< in a chain
+  std::vector<Flight> flights_;        ///< fragment slots, core by core, then vertex slots
+  std::vector<Cycle> there_;           ///< by fragment slot: before it no attributes are there
+  std::vector<std::uint32_t> next_;    ///< in a chain, of slots and then of schedulers
+  std::vector<Warp> warps_;            ///< of fragment slots
+  std::vector<VertexWarp> vertices_;   ///< of vertex slots
+  std::uint32_t vertex_first_ = 0;     ///< of the vertex warps in flight, in order
   std::uint32_t vertex_count_ = 0;
+  bool first_vertex_warp_done_ = false;
   Ring<const ShadedWarp*> completed_;
   ShadedWarpPool pool_;
   std::uint32_t slot_ = 0;
