@@ -299,21 +299,29 @@ inline std::uint32_t ClockedL2::choose(std::uint32_t index, Cycle now) const {
 
 Cycle ClockedL2::take_requests(Cycle now) {
   Cycle next = never;
-  // No bank is always the first to use a port's way in.
-  const auto first = static_cast<unsigned>(now % 64);
-  const std::uint64_t behind = banks_with_requests_ >> first << first;
+  std::uint32_t waits = nobody;
+  const std::uint64_t behind = banks_with_requests_ >> first_bank_ << first_bank_;
   for (std::uint64_t half : {behind, banks_with_requests_ ^ behind}) {
     for (; half != 0; half &= half - 1) {
       const auto index = static_cast<std::uint32_t>(__builtin_ctzll(half));
       Bank& bank = banks_[index];
       if (bank.stuck) continue;
-      if (bank.free_at <= now && take_one(index, now) && --bank.queued == 0) {
-        banks_with_requests_ &= ~(std::uint64_t{1} << index);
-      } else if (!bank.stuck) {
-        next = std::min(next, bank.free_at);
+      if (bank.free_at <= now) {
+        if (take_one(index, now)) {
+          if (--bank.queued == 0) {
+            banks_with_requests_ &= ~(std::uint64_t{1} << index);
+            continue;
+          }
+        } else if (bank.stuck) {
+          continue;
+        } else if (waits == nobody) {
+          waits = index;
+        }
       }
+      next = std::min(next, bank.free_at);
     }
   }
+  if (waits != nobody) first_bank_ = waits;
   return next;
 }
 

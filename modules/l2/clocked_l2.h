@@ -127,6 +127,7 @@ class ClockedL2 final : public sc_core::sc_module, public MemoryUnit, private Cl
   std::vector<std::unique_ptr<Port>> ports_;
   std::vector<Bank> banks_;
   std::uint64_t banks_with_requests_ = 0;  ///< a bit each
+  std::uint32_t first_bank_ = 0;           ///< that found no room on its port's way in: it is asked first
   std::vector<Queue> queues_;              ///< by bank, then port
   std::vector<Request> requests_;
   std::vector<std::uint32_t> free_requests_;

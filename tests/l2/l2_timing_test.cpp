@@ -470,6 +470,24 @@ TEST_F(L2Test, TheOldestRequestOrTheNextPortGoesFirst) {
   EXPECT_LT(in_turn[1][0], in_turn[2][0]);
 }
 
+// Those of low numbers, or of even ones, came first, and what was asked of others waited until they had nothing to do.
+TEST_F(L2Test, BanksHaveAPortsWayInInTurn) {
+  constexpr unsigned banks = 16, of_each = 12;
+  set("banks", std::to_string(banks));
+  set("bytes", "8192");
+  for (const unsigned bytes : {32U, 64U, 128U}) {
+    start();
+    std::vector<Access> accesses;
+    for (unsigned bank = 0; bank < banks; ++bank)
+      accesses.push_back(write(10, bank * line_bytes, bytes));  // that all hit
+    for (unsigned i = 0; i < of_each * banks; ++i) accesses.push_back(write(500, i % banks * line_bytes, bytes));
+    const std::vector<Cycle> completed = run(Time::clocked, accesses);
+    const auto [first, last] = std::minmax_element(completed.end() - banks, completed.end());
+    const Cycle of_all = *last - 500 - hit_cycles;
+    EXPECT_LT(*last - *first, of_all * 2 / of_each) << bytes << " bytes";
+  }
+}
+
 std::uint64_t value_of(const StatisticSet& set, const std::string& name) {
   for (const Counter* const counter : set.counters()) {
     if (counter->name() == name) return counter->value();
