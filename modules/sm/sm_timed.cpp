@@ -30,14 +30,19 @@ class TimedSm : public TimedUnit {
         behaviour_(std::move(behaviour)),
         time_(behaviour_->time()),
         cycles_per_instruction_(time_.cycles_per_instruction()),
-        roomy_(is_roomy(time_, *context.frame)),
+        roomy_(is_roomy(time_, *context.frame, no_program, 4)),
+        has_room_for_pairs_(is_roomy(time_, *context.frame, time_.merge, most_with_pairs)),
         memory_(*this, context, time_, l1_statistics_),
         fetch_gate_(context, "sm.attribute_fetch"),
         vertex_(program(time_.vertex, {}, true).front()),
         fragment_(*context.frame,
                   [&](FragmentShader shader, bool merges) {
-                    return program(time_.fragment_program(shader), merges ? time_.merge : no_program, roomy_);
+                    return program(time_.fragment_program(shader), merges ? time_.merge : no_program, false);
                   }),
+        fragment_as_one_(*context.frame,
+                         [&](FragmentShader shader, bool merges) {
+                           return program(time_.fragment_program(shader), merges ? time_.merge : no_program, true);
+                         }),
         out_vertices_(*this, "out_vertices"),
         out_shaded_(*this, "out_shaded"),
         in_release_(*this, "in_release",
@@ -82,7 +87,8 @@ class TimedSm : public TimedUnit {
     memory_.connect();
     // What memory says stands for the first stall.
     vertex_.stall_cycles -= time_.vertex.front().stall_cycles;
-    fragment_.for_each([](Program& each) { each.front().stall_cycles -= each.front().fetch.stall_cycles; });
+    for (FragmentPrograms<Program>* const programs : {&fragment_, &fragment_as_one_})
+      programs->for_each([](Program& each) { each.front().stall_cycles -= each.front().fetch.stall_cycles; });
   }
 
   struct Segment {
@@ -113,22 +119,27 @@ class TimedSm : public TimedUnit {
     return {sum};
   }
 
-  /// Whether a warp can be launched in every cycle, beside all vertex warps, which are no longer, and consecutive ones find
-  /// schedulers that differ.
-  static bool is_roomy(const SmTime& time, const Frame& frame) {
-    return has_room_for(FragmentShader::splat, time) &&
+  /// Of warps with pairs in four cycles: their quads take longer before an SM array and behind it. In all frames that were tried 2.3
+  /// are launched at most.
+  static constexpr Cycle most_with_pairs = 3;
+  /// Whether so many warps can be launched in four cycles after whose shader the instructions of `merge` come, beside all vertex
+  /// warps, which are no longer, and consecutive ones find schedulers that differ.
+  static bool is_roomy(const SmTime& time, const Frame& frame, const std::vector<ShaderSegment>& merge,
+                       Cycle launches) {
+    return has_room_for(FragmentShader::splat, time, merge, launches) &&
            std::all_of(frame.draws().begin(), frame.draws().end(),
-                       [&](const DrawCall& call) { return has_room_for(call.state.shader, time); });
+                       [&](const DrawCall& call) { return has_room_for(call.state.shader, time, merge, launches); });
   }
-  static bool has_room_for(FragmentShader shader, const SmTime& time) {
+  static bool has_room_for(FragmentShader shader, const SmTime& time, const std::vector<ShaderSegment>& merge,
+                           Cycle launches) {
     const Cycle cycles_per_instruction = time.cycles_per_instruction();
-    const Segment fragment = program(time.fragment_program(shader), {}, true).front();
+    const Segment fragment = program(time.fragment_program(shader), merge, true).front();
     const Segment merged = program(time.fragment_program(shader), time.merge, true).front();
     const Segment vertex = program(time.vertex, {}, true).front();
     const Cycle vertex_issue = vertex.all() * cycles_per_instruction;
     const Cycle fragment_issue = fragment.all() * cycles_per_instruction;
     const Cycle of_vertices = time.vertex_warps * vertex_issue / (vertex_issue + vertex.stall_cycles);
-    return vertex_issue <= fragment_issue && time.schedulers() >= fragment_issue + of_vertices &&
+    return vertex_issue <= fragment_issue && 4 * time.schedulers() >= launches * (fragment_issue + of_vertices) &&
            time.fragment_slots() >= 2 * (merged.all() * cycles_per_instruction + merged.stall_cycles) &&
            time.warps_to_one_core >= time.schedulers_per_core && 2 * time.warps_to_one_core <= time.warps_per_core;
   }
@@ -172,6 +183,7 @@ class TimedSm : public TimedUnit {
     }
     charge(UnitState::memory, std::min(launch, last_done_));
     charge(UnitState::starved, launch);
+    if (warp.merge_pairs != 0 && !has_room_for_pairs_) roomy_ = false;
     if (!roomy_) {
       hand_on_until(launch);
       in_release_.ask(launch);
@@ -197,16 +209,15 @@ class TimedSm : public TimedUnit {
       });
     }
 
-    const Program& needed = fragment_.of(warp);
     if (roomy_) {
-      const Cycle done = issue(needed.front(), slots_.scheduler_of(slot), launch, there);
+      const Cycle done = issue(fragment_as_one_.of(warp).front(), slots_.scheduler_of(slot), launch, there);
       last_done_ = std::max(last_done_, done);
       shade(warp, slot, done);
       return launch;
     }
     issue_until(launch);
     const std::uint32_t flight = take_flight(warp);
-    flights_[flight].program = &needed;
+    flights_[flight].program = &fragment_.of(warp);
     flights_[flight].slot = slot;
     flights_[flight].there = there;
     issue({launch, flight}, 0);
@@ -394,7 +405,8 @@ class TimedSm : public TimedUnit {
   std::unique_ptr<SmBehaviour> behaviour_;
   const SmTime time_;
   const Cycle cycles_per_instruction_;
-  const bool roomy_;
+  bool roomy_;  ///< until warps come for which it is not
+  const bool has_room_for_pairs_;
   SectoredCacheStatistics l1_statistics_{*this, "l1"};
   ActiveCores active_{*this, time_.cores};
   TimedSmMemory memory_;
@@ -404,6 +416,7 @@ class TimedSm : public TimedUnit {
   EffectGate fetch_gate_;
   Segment vertex_;
   FragmentPrograms<Program> fragment_;
+  FragmentPrograms<Program> fragment_as_one_;  ///< segments, where the array is roomy
   TimedOut<VertexWarp> out_vertices_;
   TimedOut<ShadedWarpItem> out_shaded_;
   TimedIn<WarpRelease> in_release_;

@@ -10,7 +10,7 @@ namespace vrpipe {
 
 /// The slots of an SM array's fragment warps, core by core. Consecutive warps of a screen tile go to one core, so many at most and
 /// while it has slots, those behind them to the next core that has one. A warp takes the lowest slot that is free there, and slots
-/// belong to the core's schedulers in turn: as in Accel-Sim, and by docs/silicon.md as on a GPU.
+/// belong to the core's schedulers in turn, as in Accel-Sim (docs/silicon.md: what a GPU says of that).
 class WarpSlots {
  public:
   explicit WarpSlots(const SmTime& time)

@@ -173,6 +173,16 @@ TEST(Stress, FewTilesOnOneCoreWaitForTheSlotsOfThatCore) {
   }
 }
 
+/// There are schedulers for warps that come in every cycle, but not for warps that merge as well.
+TEST(Stress, WarpsThatMergeForLongWaitForTheirSchedulers) {
+  expect_lt_is_near(request_of("qm", Fidelity::cycle,
+                               [](RunRequest& r) {
+                                 r.format = ColorFormat::rgba8;
+                                 r.settings = {{"sm", "merge_instructions", "39"}};
+                               }),
+                    random_draw(64, 64, 4000, 6), 0.01);
+}
+
 /// Few places under way and a long way to memory.
 TEST(Stress, AFarMemoryAndBinsOfOneQuadDoNotDelayFills) {
   expect_lt_is_near(request_of("het+qm", Fidelity::cycle,
