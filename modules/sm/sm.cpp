@@ -373,7 +373,7 @@ void SplatShader::shade_pairs(const Warp& warp, Threads& threads, ShadedWarp& ou
 }
 
 namespace {
-// With few cores SMs bound most draws, and L2 gets what they ask for in another order at lt.
+// With few cores SMs bound most draws, whose order of warps decides: lt is up to 21 % off (benchmarks/lt_errors).
 const SlotRegistrar sm_slot{{"sm", 90, "splat-shader", "", true, check_sm}, {{"cores", 4, 1024}}};
 const Registrar<SplatShader, SmBehaviour> registrar("sm", "splat-shader",
                                                     "Gaussian splatting shaders with alpha pruning and quad merging",
