@@ -307,16 +307,13 @@ Cycle ClockedL2::take_requests(Cycle now) {
       Bank& bank = banks_[index];
       if (bank.stuck) continue;
       if (bank.free_at <= now) {
-        if (take_one(index, now)) {
-          if (--bank.queued == 0) {
-            banks_with_requests_ &= ~(std::uint64_t{1} << index);
-            continue;
-          }
-        } else if (bank.stuck) {
+        const bool took = take_one(index, now);
+        if (bank.stuck) continue;
+        if (took && --bank.queued == 0) {
+          banks_with_requests_ &= ~(std::uint64_t{1} << index);
           continue;
-        } else if (waits == nobody) {
-          waits = index;
         }
+        if (!took && waits == nobody) waits = index;
       }
       next = std::min(next, bank.free_at);
     }

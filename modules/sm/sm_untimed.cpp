@@ -1,5 +1,6 @@
 #include "sm/attribute_traffic.h"
 #include "sm/hand_over.h"
+#include "sm/warp_slots.h"
 
 #include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/model/untimed.h>
@@ -100,13 +101,9 @@ class UntimedSm : public UntimedUnit {
     if (l1s_.empty()) {
       for (std::uint32_t core = 0; core < time_.cores; ++core) l1s_.emplace_back(time_.fetch.l1, l1_statistics_);
     }
-    if (warp.tile != last_tile_ || sent_to_core_ == time_.warps_to_one_core) {
-      core_ = core_ + 1 == time_.cores ? 0 : core_ + 1;
-      sent_to_core_ = 0;
-    }
-    last_tile_ = warp.tile;
-    ++sent_to_core_;
-    SectoredCache& l1 = l1s_[core_];
+    const std::uint32_t slot = slots_.take(warp.tile);
+    slots_.release(slot);
+    SectoredCache& l1 = l1s_[slots_.core_of(slot)];
     unsigned sectors = 0;
     for (unsigned i = 0; i < reads_.count; ++i) {
       LineAccess access;
@@ -139,9 +136,7 @@ class UntimedSm : public UntimedUnit {
   SectoredCacheStatistics l1_statistics_{*this, "l1"};
   std::vector<SectoredCache> l1s_;  ///< by core; none before the first warp
   AttributeTraffic::FragmentReads reads_;
-  TileId last_tile_;
-  std::uint32_t core_ = 0;
-  std::uint32_t sent_to_core_ = 0;
+  WarpSlots slots_{time_};  ///< all free: who needs no time holds none
   ShadedWarp shaded_;
   HandOver hand_over_;
   const ScreenTiling tiling_;
